@@ -61,7 +61,7 @@
 ---The value of a joint is within a range.
 ---@class softvt.Turned
 ---@field joint string Part of an articulated object (stove.knob).
----@field range number[] Lowest and highest value, rad of a hinge and m of a slider. Expects a list of 2 numbers.
+---@field range number[] Lowest and highest value, rad of a hinge and m of a slider. Expects a list of 2 numbers in -6.2832..6.2832 (rad or m).
 
 ---The centres of two objects are near each other in the horizontal plane, and the robot does not touch the object, for a time.
 ---@class softvt.Near
@@ -215,8 +215,8 @@
 ---@class softvt.Hinge
 ---@field axis number[] Axis about which its value grows, right-handed. Expects a list of 3 numbers (object frame).
 ---@field origin number[] A point of the axis, with all joints at 0. Expects a list of 3 numbers (m, object frame).
----@field lower number Lowest value. Expects radians.
----@field upper number Highest value, above the lowest. Expects radians.
+---@field lower number Lowest value. Expects radians in -6.2832..6.2832.
+---@field upper number Highest value, above the lowest. Expects radians in -6.2832..6.2832.
 ---@field damping? number Viscous damping. Expects a number (N m s/rad) of 0 or more. Default 0.
 ---@field friction? number Dry friction. Expects a number (N m) of 0 or more. Default 0.
 
@@ -530,7 +530,7 @@
 ---@field height_m number Height of a capital letter. Expects metres in 0.0005..1.
 ---@field at number[] Middle of the line; of a wrapped line, only the height counts. Expects a list of 3 numbers (m).
 ---@field facing "+x"|"-x"|"+y"|"-y"|"+z"|"-z"|number[] Direction that the printed surface faces. The top of the letters points to +y on top faces, else to +z. Expects one of "+x", "-x", "+y", "-y", "+z", "-z" or a list of 3 numbers (any length).
----@field angle? number Rotation of the line on its surface, counter-clockwise for the reader. Expects radians. Default 0.
+---@field angle? number Rotation of the line on its surface, counter-clockwise for the reader. Expects radians in -6.2832..6.2832. Default 0.
 ---@field wrap_m? number Radius of the upright cylinder about the z axis that the line is wrapped around; flat by default. Expects metres of 0.000001 or more.
 ---@field weight? number Thickening of the strokes, in heights of a capital letter. Expects a number in 0..0.25. Default 0.08.
 ---@field font? "sans"|"mono" Typeface. Default "sans".
@@ -538,7 +538,7 @@
 ---Rotates the shape about an axis through the origin.
 ---@class softvt.RotateSpec
 ---@field axis "x"|"y"|"z" The axis.
----@field angle number Right-handed angle. Expects radians.
+---@field angle number Right-handed angle. Expects radians in -6.2832..6.2832.
 
 ---Twists the shape about an axis through the origin.
 ---@class softvt.TwistSpec
@@ -631,8 +631,8 @@
 ---@class softvt.NewCamera
 ---@field name string Name, unique; also that of its image stream.
 ---@field mount? "world"|"hand" Frame that the camera is fixed to; hand is panda_hand. Default "world".
----@field position number[] Position. Expects a list of 3 numbers in -1000000..1000000 (m, frame of the mount).
----@field look_at? number[] A point in the middle of the image. Expects a list of 3 numbers in -1000000..1000000 (m, frame of the mount).
+---@field position number[] Position. Expects a list of 3 numbers in -100..100 (m, frame of the mount).
+---@field look_at? number[] A point in the middle of the image. Expects a list of 3 numbers in -100..100 (m, frame of the mount).
 ---@field up? number[] Upward direction in the image (with look_at); z by default. Expects a list of 3 numbers (frame of the mount).
 ---@field quaternion? number[] Orientation: the camera looks along its −z axis, and +y is up in the image. Expects a list of 4 numbers (w, x, y, z, frame of the mount).
 ---@field fovy? number Vertical field of view. Expects radians in 0.01..2.8. Default 0.8.
@@ -1301,7 +1301,7 @@ function Rng:shuffle(list) end
 ---@field base number[] Position of the robot base. Expects a list of 3 numbers in -1000..1000 (m, world).
 ---@field start_q number[] Joint angles of the arm at the start, within its limits. Expects a list of 7 numbers (rad).
 ---@field prompt string The instruction of the task, in shifts; nil in layouts.
----@field gravity number[] Gravity. Expects a list of 3 numbers (m/s², world).
+---@field gravity number[] Gravity. Expects a list of 3 numbers in -100..100 (m/s², world).
 ---@field workspace_min number[] Lowest corner of the workspace. Expects a list of 3 numbers (m, world).
 ---@field workspace_max number[] Highest corner of the workspace. Expects a list of 3 numbers (m, world).
 local Scene = {}
@@ -1334,12 +1334,12 @@ function Scene:add_camera(spec) end
 ---The light of a scene: a key light and a sky.
 ---@class softvt.Light
 ---@field direction number[] Direction to the key light. Expects a list of 3 numbers (world, any length).
----@field colour number[] Colour of the key light. Expects a list of 3 numbers in 0..1000 (linear RGB).
+---@field colour number[] Colour of the key light. Expects a list of 3 numbers in 0..20 (linear RGB).
 ---@field strength number Strength of the key light; 1 shows a white surface at full value. Expects a number in 0..1000.
 ---@field softness number Half of the angle under which the key light is seen; larger values give softer shadows. Expects radians in 0..0.5.
----@field sky_zenith number[] Light from straight above. Expects a list of 3 numbers in 0..1000 (linear RGB).
----@field sky_horizon number[] Light from the horizon, and the background. Expects a list of 3 numbers in 0..1000 (linear RGB).
----@field sky_ground number[] Light from straight below. Expects a list of 3 numbers in 0..1000 (linear RGB).
+---@field sky_zenith number[] Light from straight above. Expects a list of 3 numbers in 0..20 (linear RGB).
+---@field sky_horizon number[] Light from the horizon, and the background. Expects a list of 3 numbers in 0..20 (linear RGB).
+---@field sky_ground number[] Light from straight below. Expects a list of 3 numbers in 0..20 (linear RGB).
 ---@field sky_strength number Factor on the sky. Expects a number in 0..1000.
 ---@field exposure number Factor on the whole image. Expects a number in above 0..1000.
 local Light = {}
@@ -1348,7 +1348,7 @@ local Light = {}
 ---@class softvt.Camera
 ---@field name string Name.
 ---@field mount "world"|"hand" Frame that the camera is fixed to.
----@field position number[] Position. Expects a list of 3 numbers in -1000000..1000000 (m, frame of the mount).
+---@field position number[] Position. Expects a list of 3 numbers in -100..100 (m, frame of the mount).
 ---@field quaternion number[] Orientation: the camera looks along its −z axis, and +y is up in the image. Expects a list of 4 numbers (w, x, y, z, frame of the mount).
 ---@field fovy number Vertical field of view. Expects radians in 0.01..2.8.
 ---@field near number Nearest visible distance. Expects metres in 0.0001..100.

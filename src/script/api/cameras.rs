@@ -23,8 +23,8 @@ const NEAR: Type = Type::Number("m", Range::closed(1e-4, 100.0));
 const FAR: Type = Type::Number("m", Range::closed(1e-3, 1e4));
 /// Width or height of a camera's image.
 pub(crate) const IMAGE_EDGE: Type = Type::Integer(Range::closed(1.0, 4096.0));
-const LIGHT_COLOUR: Type = Type::colour(BRIGHTNESS.max);
-const POINT: Type = Type::Vector(3, "m, frame of the mount", Range::closed(-1e6, 1e6));
+const LIGHT_COLOUR: Type = Type::colour(20.0);
+const POINT: Type = Type::Vector(3, "m, frame of the mount", Range::closed(-100.0, 100.0));
 const ORIENTATION: Type = Type::Quaternion("frame of the mount");
 
 choice! { CameraMount { "world" => World, "hand" => Hand } }

@@ -2,6 +2,7 @@
 
 use mlua::{Function, Lua, Table, Value};
 
+use super::pose::ANGLES;
 use crate::{
     schema::{
         FromChecked, HasTable, LuaType, Range, Record, RecordType, Type, Unchecked, choice, functions, make,
@@ -78,7 +79,7 @@ record! {
         /// Part of an articulated object (stove.knob).
         joint: String;
         /// Lowest and highest value, rad of a hinge and m of a slider.
-        range: [f64; 2];
+        range: [f64; 2] = Type::Vector(2, "rad or m", ANGLES);
     }
     /// The centres of two objects are near each other in the horizontal plane, and the robot does not touch the object,
     /// for a time.

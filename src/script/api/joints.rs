@@ -4,7 +4,7 @@ use std::{collections::BTreeMap, sync::Arc};
 
 use mlua::{Lua, Table};
 
-use super::{shapes::LuaShape, visuals::visuals_of};
+use super::{pose::ANGLES, shapes::LuaShape, visuals::visuals_of};
 use crate::{
     schema::{
         FromChecked, Range, Record, RecordType, Type, ValidationError, error_at_key, invalid, one_of, record,
@@ -37,9 +37,9 @@ record! {
         /// A point of the axis, with all joints at 0.
         origin: [f64; 3] = Type::vector(3, "m, object frame");
         /// Lowest value.
-        lower: f64 = Type::Number("rad", Range::ANY);
+        lower: f64 = Type::Number("rad", ANGLES);
         /// Highest value, above the lowest.
-        upper: f64 = Type::Number("rad", Range::ANY);
+        upper: f64 = Type::Number("rad", ANGLES);
         /// Viscous damping.
         damping: f64 = Type::Number("N m s/rad", Range::NOT_NEGATIVE) => Number(0.0);
         /// Dry friction.

@@ -3,9 +3,14 @@
 use nalgebra::Quaternion;
 
 use super::scene::YAW;
-use crate::schema::{Type, check::MIN_LENGTH, class, functions};
+use crate::schema::{Range, Type, check::MIN_LENGTH, class, functions};
 use softvt_geometry::{Pose, Quat, Vec3};
 use softvt_robot::rotation;
+
+/// Angles up to a full turn, rad. Larger ones are given in degrees by mistake.
+pub(crate) const ANGLES: Range = Range::closed(-FULL_TURN, FULL_TURN);
+#[expect(clippy::approx_constant, reason = "messages show it")]
+const FULL_TURN: f64 = 6.2832;
 
 /// Divides the numbers by the largest magnitude, so that no square over- or underflows. `None` if that is too small or
 /// not finite.

@@ -11,6 +11,7 @@ use super::{
     assets::{AssetSpec, COEFFICIENT, DENSITY, PASCALS, POISSON},
     cameras::{CameraSpec, LuaCamera, LuaLight},
     index_of, joints,
+    pose::ANGLES,
     visuals::LuaMaterial,
 };
 use crate::{
@@ -33,10 +34,8 @@ const POSITION: Type = Type::Vector(3, "m, world", COORDINATE);
 const COORDINATE: Range = Range::closed(-MAX_COORDINATE, MAX_COORDINATE);
 /// Static coefficient of a coating.
 pub(crate) const COATING: Type = Type::Number("", Range::above(0.0, 10.0));
-/// Rotation about the vertical. Larger ones are given in degrees by mistake.
-pub(crate) const YAW: Type = Type::Number("rad", Range::closed(-FULL_TURN, FULL_TURN));
-#[expect(clippy::approx_constant, reason = "messages show it")]
-const FULL_TURN: f64 = 6.2832;
+/// Rotation about the vertical.
+pub(crate) const YAW: Type = Type::Number("rad", ANGLES);
 /// Uniform scales of objects.
 const SCALE: Type = Type::Number("", Range::closed(0.1, 10.0));
 const CORNER: Type = Type::vector(3, "m, world");
@@ -312,7 +311,7 @@ class! {
                 set(lua, this, prompt: String) { this.set_prompt(lua, prompt)?; }
             }
             /// Gravity.
-            gravity: Type::vector(3, "m/s², world") => gravity;
+            gravity: Type::Vector(3, "m/s², world", Range::closed(-100.0, 100.0)) => gravity;
             /// Lowest corner of the workspace.
             workspace_min: CORNER => workspace.min;
             /// Highest corner of the workspace.

@@ -1,10 +1,13 @@
 //! Shapes: immutable values with chained methods. All lengths are in metres.
 
-use std::sync::Arc;
+use std::{f64::consts::TAU, sync::Arc};
 
 use mlua::Lua;
 
-use super::mesh_colours::{FileColours, path_beside};
+use super::{
+    mesh_colours::{FileColours, path_beside},
+    pose::ANGLES,
+};
 use crate::{
     schema::{Range, Type, choice, class, functions, record_of},
     vm::{
@@ -13,9 +16,9 @@ use crate::{
         memory_budget::{Reservation, reserve},
     },
 };
-use softvt_common::parallel::lock;
+use softvt_common::{parallel::lock, text::format_number};
 use softvt_geometry::{
-    Quat, Vec3,
+    Aabb, Quat, Vec3,
     import::{MeshFormat, MeshImportError, MeshImportOptions, import, import_colours},
     mass::mass_properties,
     shape::{Axis, Bumps, Ramp, Ridges, Shape, ShapeError, ShapeTreeSize, SurfaceRelief},
@@ -110,6 +113,38 @@ impl LuaShape {
     /// A copy of its tree.
     pub(crate) fn copy(&self) -> Shape {
         self.0.shape.clone()
+    }
+
+    /// Checks that a wall leaves something of the inside free.
+    fn check_shell(&self, lua: &Lua, wall: f64) -> mlua::Result<()> {
+        let thinnest = |bounds: Aabb| bounds.size().min();
+        if thinnest(self.shape().loose_bounds()) > 2.0 * wall || thinnest(self.shape().bounds()) > 2.0 * wall
+        {
+            return Ok(());
+        }
+        let message = format!(
+            "shape:shell: a wall of {} m fills the shape; lengths are in metres",
+            format_number(wall)
+        );
+        Err(fail(lua, message))
+    }
+
+    /// Checks that a bent shape does not reach the centre of its arc, or its own other end.
+    fn check_bend(&self, lua: &Lua, along: Axis, towards: Axis, curvature: f64) -> mlua::Result<()> {
+        let overlaps = |bounds: Aabb| {
+            let (i, k) = (along.index(), towards.index());
+            let reach = (bounds.min[k] * curvature).max(bounds.max[k] * curvature);
+            reach >= 1.0 || bounds.size()[i] * curvature.abs() > TAU
+        };
+        if !overlaps(self.shape().loose_bounds()) || !overlaps(self.shape().bounds()) {
+            return Ok(());
+        }
+        let message = format!(
+            "shape:bend: with a curvature of {} per m, an arc of radius {} m, the shape overlaps itself",
+            format_number(curvature),
+            format_number(1.0 / curvature.abs())
+        );
+        Err(fail(lua, message))
     }
 
     /// A shape made of this one and `others`.
@@ -272,6 +307,7 @@ class! {
             }
             /// Keeps the wall of this thickness (m) below the surface.
             fn shell(lua, this, wall: f64 = METRES) -> ["softvt.Shape"] {
+                this.check_shell(lua, wall)?;
                 this.derived(lua, this.copy().shell(wall), &[])?
             }
             /// Joins two shapes.
@@ -314,7 +350,7 @@ class! {
                 /// The axis.
                 axis: Axis;
                 /// Right-handed angle.
-                angle: f64 = Type::Number("rad", Range::ANY);
+                angle: f64 = Type::Number("rad", ANGLES);
             } -> ["softvt.Shape"] {
                 let axis = nalgebra::Unit::new_unchecked(axis.unit());
                 this.derived(lua, this.copy().rotated(Quat::from_axis_angle(&axis, angle)), &[])?
@@ -334,7 +370,10 @@ class! {
                 towards: Axis;
                 /// Curvature of the arc.
                 curvature: f64 = Type::Number("1/m", Range::ANY);
-            } -> ["softvt.Shape"] { this.derived(lua, this.copy().bent(along, towards, curvature), &[])? }
+            } -> ["softvt.Shape"] {
+                this.check_bend(lua, along, towards, curvature)?;
+                this.derived(lua, this.copy().bent(along, towards, curvature), &[])?
+            }
             /// Adds regular ridges to a shape: rings, flutes, screws or spirals.
             fn ridges(lua, this) takes spec "softvt.RidgesSpec" {
                 /// The axis that the ridges run around or along.

@@ -5,7 +5,10 @@ use std::sync::{Arc, Mutex};
 
 use mlua::{Lua, Value};
 
-use super::{pose::direction, shapes::LuaShape};
+use super::{
+    pose::{ANGLES, direction},
+    shapes::LuaShape,
+};
 use crate::{
     schema::{FieldDefault, FromChecked, LuaType, Range, Type, choice, class, functions, invalid, record_of},
     vm::{
@@ -308,7 +311,7 @@ functions! {
             /// Direction that the printed surface faces. The top of the letters points to +y on top faces, else to +z.
             facing: Direction = FACING;
             /// Rotation of the line on its surface, counter-clockwise for the reader.
-            angle: f64 = Type::Number("rad", Range::ANY) => Number(0.0);
+            angle: f64 = Type::Number("rad", ANGLES) => Number(0.0);
             /// Radius of the upright cylinder about the z axis that the line is wrapped around; flat by default.
             wrap_m: Option<f64> = LENGTH;
             /// Thickening of the strokes, in heights of a capital letter.

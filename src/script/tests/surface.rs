@@ -203,7 +203,7 @@ fn errors_of_read_only_lists_name_the_way_to_change_the_object() {
         ),
         (
             "scene:camera('wrist'):look_at('abc')",
-            "scene:camera(\"wrist\"):look_at: point: expected a list of 3 numbers in -1000000..1000000 (m, frame of the mount), got \"abc\"",
+            "scene:camera(\"wrist\"):look_at: point: expected a list of 3 numbers in -100..100 (m, frame of the mount), got \"abc\"",
         ),
         (
             "scene:camera('wrist').quaternion = { 0, 0, 0, 0 }",

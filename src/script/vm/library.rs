@@ -412,7 +412,8 @@ fn read_main(main: &Path, name: &str) -> Result<Vec<u8>, ScriptError> {
 fn missing(main: &Path, name: &str) -> ScriptError {
     let mut known: Vec<String> =
         ["scripts", "suites"].iter().flat_map(|tree| embedded_scripts(tree)).collect();
-    let entries = fs::read_dir(folder_of(main)).into_iter().flatten().flatten();
+    let folders = [folder_of(main), Path::new("suites").to_owned()];
+    let entries = folders.iter().filter_map(|folder| fs::read_dir(folder).ok()).flatten().flatten();
     known.extend(entries.map(|e| display(&e.path())).filter(|n| n.ends_with(".lua")));
     let error = ScriptError::new(name, "no such file");
     // Folders and endings are alike, and would make distant names close.
