@@ -233,6 +233,7 @@ local function complete(spec)
   end
   if full.stop ~= "width" and full.stop ~= "touch" then refuse("stop", '"width" or "touch"') end
   if full.to then places.check("pick_place", full, 4) end
+  if full.distance and not full.to then refuse("distance", "nothing without `to`, which places beside the target") end
   if full.to and full.stack then refuse("stack", "nothing beside `to`, which places beside the target") end
   if full.closing_speed <= 0 or full.closing_speed > 0.2 then refuse("closing_speed", "m/s in 0..0.2, above 0") end
   return full

@@ -7,7 +7,9 @@ use softvt_benchmark::{CONTROL_DT, Task, goal_conflict::least_time};
 use softvt_common::text::{format_number, suggest};
 use softvt_geometry::pieces::SeparatePieces;
 use softvt_robot::gripper::MAX_WIDTH;
-use softvt_scene::{Asset, Body, EXPERT_HINTS, GRASP_WIDTH_HINT, Object, Scene, SoftMaterial};
+use softvt_scene::{
+    Asset, Body, EXPERT_HINTS, GRASP_HEIGHT_HINT, GRASP_WIDTH_HINT, Object, Scene, SoftMaterial,
+};
 
 /// Warnings about a scene of a task, one line each: materials, soft bodies of few voxels, bodies of several pieces or
 /// off their axis, hints with misspelt names, a target that the gripper cannot grasp, objects outside of the workspace,
@@ -22,6 +24,7 @@ pub fn scene_warnings(task: &Task, scene: &Scene, cache: &AssetCache) -> BTreeSe
             .chain(pieces_warning(asset, cache))
             .chain(origin_warning(asset, cache))
             .chain(hint_warnings(asset))
+            .chain(grasp_warning(asset, cache))
             .map(move |warning| format!("asset {name}: {warning}"))
     };
     let mut all: BTreeSet<String> = scene.objects.iter().flat_map(|object| warnings(&object.asset)).collect();
@@ -140,6 +143,23 @@ fn width_warning(asset: &Asset) -> Option<String> {
             1e3 * MAX_WIDTH
         )
     })
+}
+
+/// A warning about a grasp that does not meet the object.
+fn grasp_warning(asset: &Asset, cache: &AssetCache) -> Option<String> {
+    let size = cache.bounds(&asset.shape).size();
+    let mm = |metres: f64| format_number((1e4 * metres).round() / 10.0);
+    let height = asset.hints.get(GRASP_HEIGHT_HINT).filter(|height| !(0.0..=size.z).contains(*height));
+    let width = asset.hints.get(GRASP_WIDTH_HINT).filter(|width| !(0.0..=size.xy().norm()).contains(*width));
+    let (name, value) =
+        height.map(|height| (GRASP_HEIGHT_HINT, height)).or(width.map(|width| (GRASP_WIDTH_HINT, width)))?;
+    Some(format!(
+        "hints.{name} is {} mm, and the object is {} × {} × {} mm; lengths are in metres",
+        mm(*value),
+        mm(size.x),
+        mm(size.y),
+        mm(size.z)
+    ))
 }
 
 /// Warnings about hints whose names are close to one that the standard experts read, of the asset and of its parts.

@@ -10,9 +10,10 @@ use crate::{
     selection::select_episodes,
     suite_run::SuiteRun,
 };
-use softvt_benchmark::{Suite, Task};
+use softvt_benchmark::{ObjectType, Suite, Task};
 use softvt_common::{cancel, parallel};
 use softvt_rollout::{AssetCache, SensorAssets, scene_warnings};
+use softvt_scene::{Body, Scene};
 use softvt_script::LoadedScript;
 
 /// Checks suites one after the other. Those that share assets load them once.
@@ -37,7 +38,7 @@ impl<'a> SuiteChecker<'a> {
     ///
     /// # Errors
     /// A setting, a scene, a sensor or a calibration file that is not valid; a request to stop.
-    pub fn check(&self, suite: &Suite, episodes: u32, warn: impl FnMut(String)) -> Result<(), RunError> {
+    pub fn check(&self, suite: &Suite, episodes: u32, mut warn: impl FnMut(String)) -> Result<(), RunError> {
         self.config.observer.work(&format!("checking {}", suite.name));
         let tasks: Vec<&Task> = suite.tasks.iter().collect();
         // Without episodes, a run whose actions are repeated may have fewer of them than the suite.
@@ -48,27 +49,45 @@ impl<'a> SuiteChecker<'a> {
             ..SuiteRun::new(self.config, self.script, suite, none, PathBuf::new())?
         };
         let jobs = EpisodeList::of_tasks(&tasks, episodes, None);
-        let warnings = check_scenes(&run, &self.scenes, &jobs)?;
+        let found = check_scenes(&run, &self.scenes, &jobs)?;
         self.config.observer.end();
-        warnings.into_iter().for_each(warn);
-        SuiteRun { jobs: select_episodes(self.config, suite, &tasks), ..run }.scan_limits(&self.scenes)?;
+        found.warnings.into_iter().for_each(&mut warn);
+        let run = SuiteRun { jobs: select_episodes(self.config, suite, &tasks), ..run };
+        let judged = run.scan_limits(&self.scenes)?.judged;
+        for asset in found.without_strain.intersection(&judged) {
+            warn(format!(
+                "asset {asset}: its material has neither collapse_strain nor damage_strain, so that its limit says where the press \
+                 ended, not what the material bears"
+            ));
+        }
         if cancel::requested() { Err(RunError::interrupted("interrupted")) } else { Ok(()) }
     }
 }
 
-fn check_scenes(
-    run: &SuiteRun,
-    scenes: &ScenePool,
-    jobs: &EpisodeList,
-) -> Result<BTreeSet<String>, RunError> {
-    let mut warnings = BTreeSet::new();
-    let check_scene = |EpisodeJob { task, episode }: EpisodeJob| -> Result<BTreeSet<String>, RunError> {
+/// What the scenes of a suite show.
+#[derive(Default)]
+struct SceneFindings {
+    warnings: BTreeSet<String>,
+    /// Names of the soft assets whose material has no strain limit.
+    without_strain: BTreeSet<String>,
+}
+
+fn check_scenes(run: &SuiteRun, scenes: &ScenePool, jobs: &EpisodeList) -> Result<SceneFindings, RunError> {
+    let mut all = SceneFindings::default();
+    let check_scene = |EpisodeJob { task, episode }: EpisodeJob| -> Result<SceneFindings, RunError> {
         let setup =
             scenes.with(|builder| builder.build(&run.episode_id(task, episode), &run.changes()))??;
         let mut warnings = scene_warnings(task, &setup.scene, &run.assets);
         let of_task = |warning: String| format!("task {}: {warning}", task.id);
+        warnings.extend(no_soft_target(run.suite, task, &setup.scene).map(of_task));
+        let soft = setup.scene.objects.iter().filter_map(|object| match &object.asset.body {
+            Body::Soft(material) => Some((material, &object.asset.name)),
+            _ => None,
+        });
+        let without_strain = soft.filter(|(material, _)| material.stable_strain().is_none());
+        let without_strain = without_strain.map(|(_, name)| name.clone()).collect();
         warnings.extend(run.check_scene(task, episode, setup.scene, setup.predicates)?.map(of_task));
-        Ok(warnings)
+        Ok(SceneFindings { warnings, without_strain })
     };
     let check = |position: usize| {
         let job = jobs.job(position);
@@ -78,8 +97,23 @@ fn check_scenes(
         })
     };
     parallel::run(jobs.len(), run.config.thread_count(), cancel::requested, check, |_, found| {
-        warnings.extend(found);
+        all.warnings.extend(found.warnings);
+        all.without_strain.extend(found.without_strain);
         Ok(())
     })?;
-    Ok(warnings)
+    Ok(all)
+}
+
+/// A warning about a task of a suite of soft objects whose goal moves none.
+fn no_soft_target(suite: &Suite, task: &Task, scene: &Scene) -> Option<String> {
+    let targets = task.targets();
+    let mut moved = scene.objects.iter().filter(|object| targets.contains(&object.name.as_str()));
+    let is_judged = suite.object_type == ObjectType::Rigid
+        || moved.any(|object| matches!(object.asset.body, Body::Soft(_)));
+    (!is_judged).then(|| {
+        format!(
+            "its goal moves no soft object, only {}, so that no deformation is judged",
+            targets.join(", ")
+        )
+    })
 }

@@ -70,8 +70,9 @@ impl CalibrationFile {
 pub(crate) struct SceneLimits {
     /// By name of the object in the scene.
     pub by_object: BTreeMap<String, DeformationLimit>,
-    /// Names of the assets of all soft objects.
+    /// Names of the assets of all soft objects, and of those of them that have a limit.
     assets: BTreeSet<String>,
+    judged: BTreeSet<String>,
     /// One message per object without a limit.
     missing: Vec<String>,
 }
@@ -103,6 +104,7 @@ impl CalibrationFiles {
             match self.limit_of(object)? {
                 Ok(limit) => {
                     found.by_object.insert(object.name.clone(), limit);
+                    found.judged.insert(object.nominal.name.clone());
                 }
                 Err(missing) => {
                     found.missing.push(missing.describe(object, targets.contains(&object.name.as_str())))
@@ -220,6 +222,7 @@ fn relative_path(asset: &str) -> String {
 pub(crate) struct LimitScan {
     scenes: usize,
     assets: BTreeSet<String>,
+    judged: BTreeSet<String>,
     missing: BTreeMap<String, Affected>,
 }
 
@@ -233,9 +236,8 @@ struct Affected {
 impl LimitScan {
     pub(crate) fn add(&mut self, index: EpisodeIndex, limits: SceneLimits) {
         self.scenes += 1;
-        for asset in limits.assets {
-            self.assets.insert(asset);
-        }
+        self.assets.extend(limits.assets);
+        self.judged.extend(limits.judged);
         for message in limits.missing.into_iter().collect::<BTreeSet<_>>() {
             let affected = self.missing.entry(message).or_insert(Affected { first: index, count: 0 });
             affected.count += 1;
@@ -261,7 +263,7 @@ impl LimitScan {
 
     /// The calibrations of the assets that were found.
     pub(crate) fn calibrations(&self, files: &CalibrationFiles) -> Calibrations {
-        let mut found = Calibrations::default();
+        let mut found = Calibrations { judged: self.judged.clone(), ..Calibrations::default() };
         let read = lock(&files.read);
         for asset in &self.assets {
             let file = read.get(asset).and_then(Option::as_ref);
@@ -279,6 +281,8 @@ impl LimitScan {
 /// Calibrations of the assets of a run.
 #[derive(Clone, Debug)]
 pub(crate) struct Calibrations {
+    /// Soft assets whose objects have a limit, which also fits their version.
+    pub judged: BTreeSet<String>,
     /// τ by asset, %; `None` without a calibration.
     pub tau_pct: BTreeMap<String, Option<f64>>,
     /// SHA-256 of the calibration files, by path below a project folder.
@@ -291,7 +295,7 @@ impl Default for Calibrations {
     fn default() -> Self {
         let generated_by = format!("softvt {}", env!("CARGO_PKG_VERSION"));
         let merged = ThresholdFile::new(NOMINAL_KAPPA, Vec::new(), generated_by);
-        Self { tau_pct: BTreeMap::new(), sources: BTreeMap::new(), merged }
+        Self { judged: BTreeSet::new(), tau_pct: BTreeMap::new(), sources: BTreeMap::new(), merged }
     }
 }
 

@@ -12,9 +12,12 @@ use softvt_physics::{contact::Friction, fem::ElasticMaterial};
 /// Hint that gives the width of an asset where the fingers grasp it.
 pub const GRASP_WIDTH_HINT: &str = "grasp_width_m";
 
+/// Hint that gives the height above the lowest point of an asset where the fingers grasp it.
+pub const GRASP_HEIGHT_HINT: &str = "grasp_height_m";
+
 /// Hints that the standard experts read. An asset may have others, for experts of its own.
 pub const EXPERT_HINTS: [&str; 12] = [
-    "grasp_height_m",
+    GRASP_HEIGHT_HINT,
     GRASP_WIDTH_HINT,
     "grasp_rim_m",
     "grasp_offset_m",
