@@ -67,7 +67,7 @@ pub(crate) struct RunFlags {
     #[arg(long, value_name = "N", value_parser = parse_count::<u32>)]
     pub episodes: Option<u32>,
     /// Run only these episodes of each task, counted from 0, separated by commas
-    #[arg(long = "episode", value_name = "K", value_delimiter = ',', conflicts_with_all = ["episodes", "shard"])]
+    #[arg(long = "episode", value_name = "K", value_delimiter = ',', value_parser = parse_episode, conflicts_with_all = ["episodes", "shard"])]
     pub selected_episodes: Vec<u32>,
     /// Number of threads; results do not depend on it [default: number of processors]
     #[arg(long, value_name = "N", value_parser = value_parser!(u16).range(1..=1024))]
@@ -138,9 +138,13 @@ impl Request {
         let in_file = |error: CliError| error.prefixed(script.file.display());
         let shifts = script.shifts.iter().map(|word| parse_shift(word)).collect::<Result<_, _>>();
         let settings = script.settings.iter().map(|word| parse_pair("--set", word)).collect::<Result<_, _>>();
+        let (shifts, settings): (Vec<ShiftValue>, Vec<(String, String)>) =
+            (shifts.map_err(in_file)?, settings.map_err(in_file)?);
+        refuse_repeated("--shift", shifts.iter().map(|shift| shift.name.as_str())).map_err(in_file)?;
+        refuse_repeated("--set", settings.iter().map(|(path, _)| path.as_str())).map_err(in_file)?;
         let config = RunConfig {
-            shifts: shifts.map_err(in_file)?,
-            settings: settings.map_err(in_file)?,
+            shifts,
+            settings,
             seed: script.seed,
             secret,
             rigid_twin: script.rigid_twin,
@@ -408,8 +412,21 @@ pub(crate) fn parse_count<T: FromStr + From<u8> + PartialOrd>(word: &str) -> Res
     count.ok_or_else(|| "expected a whole number of 1 or more".to_owned())
 }
 
+fn parse_episode(word: &str) -> Result<u32, String> {
+    word.parse().map_err(|_| "expected numbers of episodes, separated by commas, as in 0,1,2".to_owned())
+}
+
 fn parse_seed(word: &str) -> Result<u64, String> {
     word.parse().map_err(|_| format!("expected a whole number in 0..{}", u64::MAX))
+}
+
+/// Refuses a name that is given twice, of which only the last value would count.
+fn refuse_repeated<'a>(flag: &str, names: impl Iterator<Item = &'a str>) -> Result<(), CliError> {
+    let mut seen = BTreeSet::new();
+    match names.into_iter().find(|name| !seen.insert(*name)) {
+        Some(name) => Err(CliError::input(format!("{flag} {name}: is given twice; give it once"))),
+        None => Ok(()),
+    }
 }
 
 fn parse_pair(flag: &str, word: &str) -> Result<(String, String), CliError> {

@@ -165,7 +165,7 @@ fn usage_error(text: &str) -> CliError {
     CliError::input(message.trim_end())
 }
 
-/// A message about a first word that is neither a file nor a command, and near a command.
+/// A message about a first word that is neither a file nor a command: near a command, or before a script.
 fn misspelt_command(words: &[String]) -> Option<String> {
     let first = words.get(1).filter(|word| !word.starts_with('-') && !word.contains(['.', '/', '\\']))?;
     let command = clap_command();
@@ -173,8 +173,11 @@ fn misspelt_command(words: &[String]) -> Option<String> {
     if names.contains(&first.as_str()) || first == "help" || Path::new(first).exists() {
         return None;
     }
-    let close = text::suggest(first, names.into_iter())?;
-    Some(format!("unknown command {first:?}; did you mean {close:?}?"))
+    match (text::suggest(first, names.into_iter()), words.get(2).filter(|word| word.ends_with(".lua"))) {
+        (Some(close), _) => Some(format!("unknown command {first:?}; did you mean {close:?}?")),
+        (None, Some(file)) => Some(format!("unknown command {first:?}; softvt {file} runs the file")),
+        (None, None) => None,
+    }
 }
 
 /// Finds the script on the command line: the first word that ends in `.lua` and is not the value of another flag.
@@ -204,6 +207,8 @@ mod tests {
         };
         let expected = "unknown command \"recrod\"; did you mean \"record\"?";
         assert_eq!(message(&["recrod", "suites/x.lua"]).as_deref(), Some(expected));
+        let run = "unknown command \"run\"; softvt x.lua runs the file";
+        assert_eq!(message(&["run", "x.lua"]).as_deref(), Some(run));
         for words in [&["record", "x.lua"][..], &["help"], &["suites/x.lua"], &["x.lua"], &["--version"], &[]]
         {
             assert_eq!(message(words), None, "{words:?}");
