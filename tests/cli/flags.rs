@@ -55,6 +55,7 @@ fn settings_and_seed_reach_the_simulations_of_an_experiment() {
     for (words, part) in [
         ("--set nonsense=1", "no setting \"nonsense\""),
         ("--set physics.dt=-1", "physics.dt"),
+        ("--set physics.dt=0.01 --set physics.dt=0.02", "--set physics.dt: is given twice; give it once"),
         ("--set criteria.slip_m=0.1", "--set criteria.slip_m: an experiment judges no episodes"),
         (
             "--shift mass=2",

@@ -142,7 +142,7 @@ fn implausible_units_and_wide_objects_are_doubted() {
     );
     let misspelt = Small::default().text().replace(
         "name = \"cube\", shape",
-        "hints = { grasp_heigth_m = 0.01, weight = 1 }, name = \"cube\", shape",
+        "hints = { grasp_heigth_m = 0.01, grasp_height_m = 20, weight = 1 }, name = \"cube\", shape",
     );
     let misspelt = warnings(&Project::new(&[("x.lua", &misspelt)]));
     assert!(
@@ -152,6 +152,8 @@ fn implausible_units_and_wide_objects_are_doubted() {
         "{misspelt}"
     );
     assert!(!misspelt.contains("weight"), "{misspelt}");
+    let beside = "asset cube: hints.grasp_height_m is 20000 mm, and the object is 40 × 40 × 40 mm; lengths are in metres";
+    assert!(misspelt.contains(beside), "{misspelt}");
     let ball = "softvt.shape.sphere { radius = 0.02 }";
     let text = Small::default()
         .text()
@@ -159,6 +161,8 @@ fn implausible_units_and_wide_objects_are_doubted() {
         .replace("softvt.soft { youngs_pa = 2e4, poisson = 0.3,", "softvt.rigid {");
     let pieces = warnings(&Project::new(&[("x.lua", &text)]));
     assert!(pieces.contains("asset cube: its shape has 2 separate pieces, "), "{pieces}");
+    let expected = "task 0: its goal moves no soft object, only cube, so that no deformation is judged";
+    assert!(pieces.contains(expected), "{pieces}");
 }
 
 #[test]

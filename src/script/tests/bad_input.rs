@@ -238,6 +238,22 @@ fn wrong_settings_are_named_with_their_line_and_a_close_name() {
 }
 
 #[test]
+fn shapes_in_wrong_units_are_refused() {
+    let message = |call: &str| {
+        error_of(&format!("local box = softvt.shape.box {{ size = {{ 0.1, 0.04, 0.04 }} }}\nbox:{call}"))
+    };
+    for (call, expected) in [
+        ("rotate { axis = 'z', angle = 90 }", "-6.2832..6.2832, got 90"),
+        ("shell(2)", "suites/x.lua:2: shape:shell: a wall of 2 m fills the shape; lengths are in metres"),
+        ("bend { along = 'x', towards = 'z', curvature = -60 }", "an arc of radius 0.016"),
+        ("bend { along = 'x', towards = 'y', curvature = 40 }", "a script returns a plan"),
+        ("shell(0.01)", "a script returns a plan"),
+    ] {
+        assert!(message(call).contains(expected), "{call}: {}", message(call));
+    }
+}
+
+#[test]
 fn an_impossible_material_is_refused() {
     let soft = |rest: &str| error_of(&format!("softvt.soft {{ density = 200, {rest} }}"));
     assert_eq!(
