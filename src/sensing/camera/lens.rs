@@ -175,6 +175,26 @@ impl Lens {
         -self.in_camera_frame(p_w).z
     }
 
+    /// False if all points lie more than `margin` outside one side of the view frustum, m.
+    pub(crate) fn may_see_any(&self, points: &[V3], margin: f32) -> bool {
+        let [x, y] = [self.width, self.height].map(|edge| 0.5 * edge as f32 / self.focal);
+        let [nx, ny] = [x, y].map(|slope| 1.0 / (1.0 + slope * slope).sqrt());
+        // Inward unit normals in the camera frame, which looks along −z.
+        let sides = [
+            V3::new(nx, 0.0, -x * nx),
+            V3::new(-nx, 0.0, -x * nx),
+            V3::new(0.0, ny, -y * ny),
+            V3::new(0.0, -ny, -y * ny),
+            -V3::z(),
+        ];
+        let to_world = self.to_view.transpose();
+        sides.iter().all(|side| {
+            let normal = to_world * side;
+            let offset = normal.dot(&self.eye) - margin;
+            points.iter().any(|p| normal.dot(p) >= offset)
+        })
+    }
+
     /// False if a ball lies wholly outside the view frustum.
     pub(crate) fn may_see(&self, centre: &V3, radius: f32) -> bool {
         let c = self.in_camera_frame(centre);
@@ -183,5 +203,26 @@ impl Lens {
             (along.abs() + c.z * half) < radius * (1.0 + half * half).sqrt()
         };
         -c.z + radius > self.near && is_inside(c.x, self.width) && is_inside(c.y, self.height)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_object_beside_the_view_is_out_of_it_though_its_bounding_ball_is_not() {
+        let camera = Camera { pose: Pose::identity(), ..Camera::third_person_table() };
+        let lens = Lens::new(&camera, None).expect("a good camera");
+        let half = 0.5 * camera.width as f32 / lens.focal;
+        // A rod along the line of sight, and the same rod shifted until it meets the right side of the view.
+        let rod = |x: f32| [V3::new(x, 0.0, 0.5), V3::new(x, 0.0, -0.5)];
+        let radius = 0.5;
+        for (x, is_seen) in [(0.0, true), (0.49 * half, true), (0.55 * half, false), (-0.55 * half, false)] {
+            assert!(lens.may_see(&V3::new(x, 0.0, 0.0), radius), "{x}");
+            assert_eq!(lens.may_see_any(&rod(x), 0.0), is_seen, "{x}");
+            assert!(lens.may_see_any(&rod(x), 0.1), "{x}: within the margin");
+        }
+        assert!(!lens.may_see_any(&[V3::new(0.0, 0.0, 0.2), V3::new(0.1, 0.0, 0.3)], 0.1), "behind");
     }
 }

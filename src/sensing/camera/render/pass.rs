@@ -67,7 +67,11 @@ impl<'a> PosedObject<'a> {
         let bounds @ [low, high] = bounds_of(caster.posed.positions.iter().copied());
         let (centre, radius) = ((low + high) * 0.5, 0.5 * (high - low).norm());
         let is_hidden = view.hidden_id != 0 && object.segmentation_id == view.hidden_id;
-        let drawn = if !is_hidden && lens.may_see(&centre, BOUNDS_MARGIN * radius) {
+        let margin = (BOUNDS_MARGIN - 1.0) * radius;
+        let is_in_view = || {
+            lens.may_see(&centre, BOUNDS_MARGIN * radius) && lens.may_see_any(&caster.posed.positions, margin)
+        };
+        let drawn = if !is_hidden && is_in_view() {
             let pixel = (lens.depth(&centre) - radius).max(lens.near) / lens.focal;
             let level = mesh.coarsest_where(|lod| lod.is_fine_enough(pixel))?;
             Some(if level == caster_level { caster.clone() } else { pose(level)? })
