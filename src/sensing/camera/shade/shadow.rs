@@ -169,14 +169,14 @@ impl ShadowMap {
     /// Computes the ranges of heights.
     fn update_ranges(&mut self) {
         self.ranges.fill(HeightRange::EMPTY);
-        let [from, to] = self.texels.drawn_rows;
+        let ([from, to], [first, last]) = (self.texels.drawn_rows, self.texels.drawn_columns);
         if from >= to {
             return;
         }
         let mut tile_ranges = vec![HeightRange::EMPTY; TILES * TILES];
         let stride = self.texels.stride();
         for row in from / TILE..to.div_ceil(TILE) {
-            for column in 0..TILES {
+            for column in first / TILE..last.div_ceil(TILE) {
                 let (mut low, mut high) = (f32x8::splat(f32::MAX), f32x8::splat(EMPTY));
                 for y in row * TILE..(row + 1) * TILE {
                     let at = y * stride + column * TILE;
