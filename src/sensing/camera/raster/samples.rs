@@ -174,11 +174,14 @@ impl TileSamples {
         let plane = Linear::new(t.w, t.dw_dx, t.dw_dy, offsets);
         let (min_w, max_w) = (f32x8::splat(t.min_w), f32x8::splat(t.max_w));
         let chunks = t.columns[0] / PIXELS_PER_CHUNK..t.columns[1].div_ceil(PIXELS_PER_CHUNK);
+        let first_x = (chunks.start * PIXELS_PER_CHUNK) as f32;
+        let mut y = t.rows[0] as f32;
         for row in t.rows[0]..t.rows[1] {
-            let row_edges = edges.map(|edge| edge.row(row as f32));
-            let row_w = plane.row(row as f32);
+            let row_edges = edges.map(|edge| edge.row(y));
+            let row_w = plane.row(y);
+            y += 1.0;
+            let mut x = first_x;
             for chunk in chunks.clone() {
-                let x = (chunk * PIXELS_PER_CHUNK) as f32;
                 // The plane of w, extrapolated to samples outside the triangle's edges, is clamped to the corners'
                 // range.
                 let w = plane.at(row_w, x).fast_max(min_w).fast_min(max_w);
@@ -189,6 +192,7 @@ impl TileSamples {
                 } else {
                     self.colours.draw(at, w, t.id, || inside(0) & inside(1) & inside(2));
                 }
+                x += PIXELS_PER_CHUNK as f32;
             }
         }
     }

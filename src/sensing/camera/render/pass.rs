@@ -27,7 +27,15 @@ pub(crate) type Bounds = [V3; 2];
 
 /// Bounds of points; inverted without any.
 pub(crate) fn bounds_of(points: impl IntoIterator<Item = V3>) -> Bounds {
-    points.into_iter().fold([V3::repeat(f32::MAX), V3::repeat(f32::MIN)], |b, p| [b[0].inf(&p), b[1].sup(&p)])
+    let mut bounds = [V3::repeat(f32::MAX), V3::repeat(f32::MIN)];
+    for p in points {
+        for axis in 0..3 {
+            // Unlike `f32::min`, a comparison is one instruction: coordinates are numbers.
+            bounds[0][axis] = if p[axis] < bounds[0][axis] { p[axis] } else { bounds[0][axis] };
+            bounds[1][axis] = if p[axis] > bounds[1][axis] { p[axis] } else { bounds[1][axis] };
+        }
+    }
+    bounds
 }
 
 /// An object of a scene in the state of an image.
