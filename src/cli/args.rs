@@ -212,7 +212,7 @@ pub(crate) struct ConnectionArgs {
     /// Protocol of a policy server [default: openpi]
     #[arg(long, value_name = "PROTOCOL")]
     protocol: Option<ServerProtocol>,
-    /// Actions executed from each predicted chunk [default: 10 for servers]
+    /// Most actions to execute of each answer [default: 10 for servers]
     #[arg(long, value_name = "N", value_parser = parse_count::<u16>)]
     replan: Option<u16>,
     /// Timeout in seconds, for connecting and for each reply [default: 60]

@@ -225,7 +225,7 @@ fn wrong_settings_are_named_with_their_line_and_a_close_name() {
             ": no setting \"robot.gripper.kpp\"; did you mean robot.gripper.kp?",
         ),
         (
-            "{ nonsense = 1 }",
+            "{ nonsense = { a = 1 } }",
             ": no setting \"nonsense.a\"; the root has: physics, robot, criteria, tactile, cameras",
         ),
         ("{ physics = { dt = 'a' } }", ".physics.dt: expected a number, got \"a\""),

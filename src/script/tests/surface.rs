@@ -180,7 +180,7 @@ fn errors_of_read_only_lists_name_the_way_to_change_the_object() {
         ("table.insert(scene.base, 1)", "scene.base: has places 1 to 3, got 4"),
         (
             "scene.light.colour = { 1, 0.5, 0.25 } scene.light.colour[1] = -1",
-            "scene.light.colour[1]: expected a number in 0..1000, got -1",
+            "scene.light.colour[1]: expected a number in 0..20, got -1",
         ),
         ("scene.objects[1] = 3", "scene.objects: cannot be written; scene:add{…} adds an object"),
         (
