@@ -52,7 +52,7 @@ pub enum SettingsError {
     TimeStep { dt: f64, below: f64, above: f64 },
 }
 
-/// What to write in place of a path whose part below `group` is unknown.
+/// Suggestion for a path whose part below `group` is unknown: the closest known field, or all of them.
 fn known_settings(path: &str, group: &str, known: &[String]) -> String {
     let below = path.strip_prefix(group).unwrap_or(path).trim_start_matches('.');
     let key = below.split('.').next().unwrap_or_default();

@@ -135,7 +135,7 @@ impl GoalInScene {
     }
 
     /// Whether a predicate that is not a placement holds. `is_touched` says of an object whether the robot presses on
-    /// it, which does not end what must not hold.
+    /// it, which does not matter to negated predicates.
     pub(super) fn holds(
         &self,
         predicate: usize,
@@ -292,8 +292,8 @@ impl Finder<'_> {
         Err(EpisodeError::JointRange { task: self.task.id, name: name.to_owned(), lower, upper, placed_at })
     }
 
-    /// A joint within what `range` makes of its limits, with a rounding error. A range that includes a limit has no end
-    /// there.
+    /// A joint within what `range` makes of its limits, with a rounding error. A range that includes a limit is open
+    /// at it.
     fn joint(&self, name: &str, range: impl Fn([f64; 2]) -> [f64; 2]) -> Result<Subject, EpisodeError> {
         const ROUNDING: f64 = 1e-4;
         let (part, limits) = self.part(name)?;

@@ -64,7 +64,7 @@ impl<'a> SuiteChecker<'a> {
     }
 }
 
-/// What the scenes of a suite show.
+/// Warnings and assets from the scenes of a suite.
 #[derive(Default)]
 struct SceneFindings {
     warnings: BTreeSet<String>,

@@ -62,7 +62,7 @@ pub(crate) struct ViewArgs {
 /// Runs one episode and writes `episode.mp4`, a picture with the verdict as `episode.png`, stills of the first, worst
 /// and last state of every camera and tactile sensor and of the target from nearby, and a page that shows them. Under
 /// several policies, video and picture show them side by side, and the stills of each are in a folder of its name.
-/// What an earlier view left in the folder is removed.
+/// The files of an earlier view in the folder are removed.
 ///
 /// # Errors
 /// The script is not a suite, the task or episode fails, or a file cannot be rendered or written.
