@@ -35,11 +35,19 @@ pub fn least_time(goal: &Goal) -> f64 {
         Goal::All(parts) => times(parts).into_iter().fold(0.0, f64::max),
         Goal::Any(parts) => times(parts).into_iter().reduce(f64::min).unwrap_or(0.0),
         Goal::Sequence(parts) => times(parts).iter().sum(),
-        Goal::Opened { .. }
-        | Goal::Closed { .. }
-        | Goal::Turned { .. }
-        | Goal::Predicate { .. }
-        | Goal::None(_) => 0.0,
+        Goal::None(parts) => parts.goals.iter().map(least_time_without).fold(0.0, f64::max),
+        Goal::Opened { .. } | Goal::Closed { .. } | Goal::Turned { .. } | Goal::Predicate { .. } => 0.0,
+    }
+}
+
+/// Least time after which a goal can have been false for as long as it would have to hold, s.
+fn least_time_without(goal: &Goal) -> f64 {
+    let times = |parts: &Parts| parts.goals.iter().map(least_time_without).collect::<Vec<_>>();
+    match goal {
+        Goal::All(parts) => times(parts).into_iter().reduce(f64::min).unwrap_or(0.0),
+        Goal::Any(parts) => times(parts).into_iter().fold(0.0, f64::max),
+        Goal::Sequence(_) | Goal::None(_) => 0.0,
+        predicate => least_time(predicate),
     }
 }
 
@@ -214,7 +222,9 @@ mod tests {
         let held = |hold_s| Goal::Upright { object: "a".into(), hold_s, angle_rad: 0.1 };
         let both = || vec![held(6.0), held(5.0)];
         let least = [sequence(both()), all(both()), any(both()), none(both())].map(|goal| least_time(&goal));
-        assert_eq!(least, [11.0, 6.0, 5.0, 0.0]);
+        assert_eq!(least, [11.0, 6.0, 5.0, 6.0]);
+        let nested = [none(vec![all(both())]), none(vec![any(both())]), none(vec![none(both())])];
+        assert_eq!(nested.map(|goal| least_time(&goal)), [5.0, 6.0, 0.0]);
     }
 
     #[test]

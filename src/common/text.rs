@@ -50,6 +50,11 @@ pub fn suggest<'a>(word: &str, candidates: impl Iterator<Item = &'a str>) -> Opt
     ranked.min_by_key(|(rank, _)| *rank).map(|(_, candidate)| candidate)
 }
 
+/// True if one or two edits turn a word into another (Damerau–Levenshtein distance), as where one is misspelt.
+pub fn is_misspelt(word: &str, meant: &str) -> bool {
+    (1..=2).contains(&strsim::damerau_levenshtein(word, meant))
+}
+
 /// A message about an unknown name: `unknown key "promt"; did you mean "prompt"?`.
 pub fn unknown_name<'a>(
     what: &str,

@@ -29,7 +29,8 @@ impl GoalNode {
         }
     }
 
-    /// Calls `visit` with the number of each predicate that must not hold: those under an odd number of `None`.
+    /// Calls `visit` with the number of each predicate that must not hold: those under an odd number of `None`, without
+    /// the earlier steps of sequences.
     pub fn for_each_negated(&self, visit: &mut impl FnMut(usize)) {
         self.walk_negated(false, visit);
     }
@@ -39,8 +40,16 @@ impl GoalNode {
             Self::Predicate(number) if is_negated => visit(*number),
             Self::Predicate(_) => {}
             Self::None(parts) => parts.iter().for_each(|part| part.walk_negated(!is_negated, visit)),
-            Self::All(parts) | Self::Any(parts) | Self::Sequence(parts) => {
+            Self::All(parts) | Self::Any(parts) => {
                 parts.iter().for_each(|part| part.walk_negated(is_negated, visit));
+            }
+            Self::Sequence(parts) => {
+                // The earlier steps have to hold once, whatever is asked of the whole.
+                let last = parts.len().saturating_sub(1);
+                parts
+                    .iter()
+                    .enumerate()
+                    .for_each(|(at, part)| part.walk_negated(is_negated && at == last, visit));
             }
         }
     }
@@ -175,6 +184,8 @@ mod tests {
         let mut negated = Vec::new();
         goal.for_each_negated(&mut |number| negated.push(number));
         None(vec![None(vec![Predicate(5)])]).for_each_negated(&mut |number| negated.push(number));
-        assert_eq!(negated, [4]);
+        None(vec![Sequence(vec![Predicate(6), Predicate(7)])])
+            .for_each_negated(&mut |number| negated.push(number));
+        assert_eq!(negated, [4, 7], "the first step has to hold once");
     }
 }

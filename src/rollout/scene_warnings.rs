@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 
 use super::asset_cache::{AssetCache, ThicknessProbe};
 use softvt_benchmark::{CONTROL_DT, Task, goal_conflict::least_time};
-use softvt_common::text::{format_number, suggest};
+use softvt_common::text::{format_number, is_misspelt};
 use softvt_geometry::pieces::SeparatePieces;
 use softvt_robot::gripper::MAX_WIDTH;
 use softvt_scene::{
@@ -167,7 +167,9 @@ fn hint_warnings(asset: &Asset) -> Vec<String> {
     let of_parts = asset.parts().iter().flat_map(|part| part.asset.hints.keys());
     let unknown = asset.hints.keys().chain(of_parts).filter(|name| !EXPERT_HINTS.contains(&name.as_str()));
     let warning = |name: &String| {
-        let close = suggest(name, EXPERT_HINTS.into_iter())?;
+        // One that the asset has as well is another hint.
+        let is_meant = |known: &&str| is_misspelt(name, known) && !asset.hints.contains_key(*known);
+        let close = EXPERT_HINTS.into_iter().find(is_meant)?;
         Some(format!("the standard experts do not read hints.{name}; did you mean {close}?"))
     };
     unknown.filter_map(warning).collect()

@@ -79,7 +79,9 @@ fn check_scenes(run: &SuiteRun, scenes: &ScenePool, jobs: &EpisodeList) -> Resul
             scenes.with(|builder| builder.build(&run.episode_id(task, episode), &run.changes()))??;
         let mut warnings = scene_warnings(task, &setup.scene, &run.assets);
         let of_task = |warning: String| format!("task {}: {warning}", task.id);
-        warnings.extend(no_soft_target(run.suite, task, &setup.scene).map(of_task));
+        if !run.config.rigid_twin {
+            warnings.extend(no_soft_target(run.suite, task, &setup.scene).map(of_task));
+        }
         let soft = setup.scene.objects.iter().filter_map(|object| match &object.asset.body {
             Body::Soft(material) => Some((material, &object.asset.name)),
             _ => None,

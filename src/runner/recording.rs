@@ -138,16 +138,6 @@ impl<'a> SuiteRecording<'a> {
         };
         let grip_log = HoldingLog::default();
         let run = customize(run, &grip_log)?.prepare()?;
-        let limits = &run.calibrations;
-        if options.keep == KeptOutcome::Safe && !limits.tau_pct.is_empty() && limits.judged.is_empty() {
-            let assets: Vec<&str> = limits.tau_pct.keys().map(String::as_str).collect();
-            return Err(config.error(format!(
-                "no demonstration could be judged safe: {} without a limit of deformation; calibrate it (softvt scripts/calibrate.lua --asset \
-                 {}), or keep all that reach the goal (--keep goal)",
-                assets.join(", "),
-                assets[0]
-            )));
-        }
         let tasks = run.jobs.tasks();
         let attempts = tasks.iter().map(|task| run.jobs.episodes_of(task.id).count());
         let episodes = demos.unwrap_or(attempts.max().unwrap_or_default() as u32);

@@ -236,6 +236,9 @@ fn shorten(a: &Value, b: &Value) -> [String; 2] {
 pub(crate) fn difference(before: &Value, now: &Value) -> Option<String> {
     let (Value::Object(a), Value::Object(b)) = (before, now) else {
         return (before != now).then(|| {
+            if is_checksum(before) && is_checksum(now) {
+                return "has changed".to_owned();
+            }
             let [before, now] = shorten(before, now);
             format!("{before} before, {now} now")
         });
@@ -247,6 +250,11 @@ pub(crate) fn difference(before: &Value, now: &Value) -> Option<String> {
         let is_path = value(a).is_object() && value(b).is_object();
         Some(if is_path { format!("{key}.{inner}") } else { format!("{key}: {inner}") })
     })
+}
+
+/// True for a SHA-256 in hexadecimal, as those of sources.
+fn is_checksum(value: &Value) -> bool {
+    value.as_str().is_some_and(|text| text.len() == 64 && text.bytes().all(|byte| byte.is_ascii_hexdigit()))
 }
 
 #[cfg(test)]
@@ -261,6 +269,8 @@ mod tests {
         assert_eq!(difference(&a, &b).unwrap(), "settings.physics.dt: 0.0166 before, 0.01 now");
         let c = json!({ "seed": 0, "settings": { "physics": { "dt": 0.0166 } } });
         assert_eq!(difference(&a, &c).unwrap(), "shifts: [] before, null now");
+        let source = |digit: &str| json!({ "sources": { "assets/bun.lua": digit.repeat(64) } });
+        assert_eq!(difference(&source("a"), &source("b")).unwrap(), "sources.assets/bun.lua: has changed");
     }
 
     #[test]

@@ -12,6 +12,11 @@ fn valid_suites_are_listed() {
 fn standard_suites_are_valid() {
     let output = Project::new(&[]).succeeds("check suites/all.lua");
     assert_eq!(output.out.matches(" tasks, ").count(), 6);
+    assert!(!output.err.contains("warning"), "{}", output.err);
+    for words in ["check suites/household.lua", "check suites/household.lua --rigid-twin"] {
+        let output = Project::new(&[]).succeeds(words);
+        assert!(!output.err.contains("warning"), "{}", output.err);
+    }
 }
 
 #[test]

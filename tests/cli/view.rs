@@ -103,6 +103,10 @@ fn a_view_replaces_an_earlier_one_and_keeps_other_files() {
     for kept in ["noop/notes.txt", "episode.mp4", "index.html"] {
         assert!(project.path(&format!("seen/{kept}")).is_file(), "{kept}");
     }
+    // A view in the folder of another one stays.
+    project.succeeds("view x.lua --policy noop --out seen/mine");
+    project.succeeds("view x.lua --policy noop --out seen");
+    assert!(project.path("seen/mine/worst_wrist.png").is_file());
     // The folder of something else.
     project.write("page/index.html", b"mine");
     project.write("page/end_of_study.png", b"mine");

@@ -202,13 +202,23 @@ def _hdf5_files(path: Path) -> list[Path]:
         )
     manifest = path / "manifest.jsonl"
     if manifest.is_file():
-        names = {json.loads(line)["hdf5_path"] for line in manifest.read_text(encoding="utf-8").splitlines()}
-        found = [path / name for name in sorted(names)]
+        found = [path / name for name in sorted(_manifest_files(manifest))]
     else:
         found = sorted((path / "hdf5").glob("*.hdf5")) or sorted(path.glob("*.hdf5"))
     if not found:
         raise ValueError(f"{path}: no recording; give a folder that softvt record wrote, or one of its HDF5 files")
     return found
+
+
+def _manifest_files(manifest: Path) -> set[str]:
+    """The HDF5 files that a manifest names. Raises ValueError for a line that names none."""
+    names = set()
+    for number, line in enumerate(manifest.read_text(encoding="utf-8").splitlines(), 1):
+        try:
+            names.add(json.loads(line)["hdf5_path"])
+        except (ValueError, KeyError, TypeError) as error:
+            raise ValueError(f"{manifest}:{number}: not a line of a manifest: {error}") from error
+    return names
 
 
 def _tasks(task: Any) -> set[int]:

@@ -4,9 +4,10 @@ import inspect
 import math
 import os
 import shutil
+import time
 import weakref
 from collections import deque
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from functools import partial
 from typing import Any
 
@@ -38,6 +39,9 @@ NEW_ROLLOUT = "lerobot_new_rollout"
 
 CONTROL_DT = 0.05
 """Duration of a control step, s."""
+
+RECONNECT_S = 10.0
+"""Time for which an environment tries to connect again after an interrupted request, s."""
 
 _EPISODES = 2**32
 _RENDER_MODES = ("rgb_array", "sensors")
@@ -175,6 +179,8 @@ class SoftVTEnv(gymnasium.Env[Observation, np.ndarray]):
         self._lease: Lease | None = None
         if script is not None:
             spec = None if profile or parts is None else ProfileSpec(parts, control, gripper, cameras, history)
+            if image_shape is not None and any("cameras.width=" in flag or "cameras.height=" in flag for flag in flags):
+                raise ValueError("image_size sets cameras.width and cameras.height; leave them out of flags, or image_size")
             own_flags = _flags(profile, image_shape, needs_truth) + flags
             self._lease = lease(_script(script), own_flags, binary, None if spec is None else spec.to_lua())
             self._connect = self._lease.connect
@@ -207,9 +213,24 @@ class SoftVTEnv(gymnasium.Env[Observation, np.ndarray]):
     def _reconnect(self) -> None:
         """Replaces a connection in which a request was interrupted."""
         self._client.close()
-        self._client = self._connect()
+        deadline = time.monotonic() + RECONNECT_S
+        while True:
+            try:
+                self._client = self._connect()
+                break
+            except ServerError:
+                # A server with as many clients as it accepts still works on the interrupted request.
+                if time.monotonic() > deadline:
+                    raise
+                time.sleep(0.1)
         self._closer.detach()
         self._closer = self._finalizer()
+
+    def _ask(self, kind: str, **fields: Any) -> dict[str, Any]:
+        """The response to a request about the present episode."""
+        if self._client.is_interrupted and self._closer.alive:
+            raise ServerError(f"{kind}: the request before was interrupted; call reset first")
+        return self._client.request(kind, **fields)
 
     def _begin(self, suite: str | None, task: int | str | Sequence[int] | None, needs_truth: bool, history: int) -> None:
         hello = self._client.hello
@@ -289,7 +310,7 @@ class SoftVTEnv(gymnasium.Env[Observation, np.ndarray]):
         if self.render_mode is None:
             return None
         if self.render_mode == "rgb_array":
-            return self._client.request("render", camera=self._camera)["image"]
+            return self._ask("render", camera=self._camera)["image"]
         return self._render_sensors()
 
     def close(self) -> None:
@@ -320,6 +341,7 @@ class SoftVTEnv(gymnasium.Env[Observation, np.ndarray]):
         if self._client.is_interrupted and self._closer.alive:
             self._reconnect()
         requested = {"suite": self._suite, "task": task, "episode": episode, "split": self._split, **options}
+        self._last = None
         self._client.send("reset", **{key: value for key, value in requested.items() if value is not None})
         self._pending = "reset"
 
@@ -364,17 +386,19 @@ class SoftVTEnv(gymnasium.Env[Observation, np.ndarray]):
 
     def get_state(self) -> dict[str, Any]:
         """State of the episode as plain data, for `set_state` of this or an equal environment."""
-        state: dict[str, Any] = self._client.request("get_state")["state"]
+        state: dict[str, Any] = self._ask("get_state")["state"]
         return state
 
     def set_state(self, state: dict[str, Any]) -> tuple[Observation, dict[str, Any]]:
         """Restores a state bit for bit; returns what `reset` does."""
+        if self._client.is_interrupted and self._closer.alive:
+            self._reconnect()
         return self._restart(self._client.request("set_state", state=state))
 
     def camera_matrices(self) -> dict[str, dict[str, Any]]:
         """Of each camera by name, in the present state: `width` and `height` of its image, pixels, its matrix `intrinsic` (3, 3), and its pose in
         the robot's base frame `pose_b` (4, 4), with the axes of OpenGL: x right, y up, view along −z."""
-        cameras: dict[str, dict[str, Any]] = self._client.request("cameras")["cameras"]
+        cameras: dict[str, dict[str, Any]] = self._ask("cameras")["cameras"]
         return cameras
 
     @property
@@ -508,8 +532,8 @@ class SoftVTEnv(gymnasium.Env[Observation, np.ndarray]):
     def _render_sensors(self) -> np.ndarray:
         """Both cameras above both fingers."""
         names = [*self.camera_matrices()][:2]
-        cameras = [self._client.request("render", camera=name, width=320, height=_SENSOR_EDGE)["image"] for name in names]
-        fingers = [self._client.request("render", camera=side)["image"] for side in ("left", "right")]
+        cameras = [self._ask("render", camera=name, width=320, height=_SENSOR_EDGE)["image"] for name in names]
+        fingers = [self._ask("render", camera=side)["image"] for side in ("left", "right")]
         return np.vstack([np.hstack(cameras), np.hstack(fingers)])
 
 
@@ -707,4 +731,4 @@ def _costs(before: Mapping[str, Any] | None, now: Mapping[str, Any]) -> dict[str
 
 def _times_over_limit(verdict: Mapping[str, Any]) -> list[float]:
     """Time for which D of each object that the goal moves was beyond its τ, s."""
-    return [target["time_over_tau_s"] or 0.0 for target in (verdict, *verdict.get("targets", ()))]
+    return [target.get("time_over_tau_s") or 0.0 for target in (verdict, *verdict.get("targets", ()))]

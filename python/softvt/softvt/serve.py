@@ -92,9 +92,10 @@ class Client:
             raise ServerError("the connection is closed")
         if self._awaits_response:
             raise ServerError(f"{kind}: the request before was interrupted; make a new connection")
+        message = msgpack.packb({"type": kind, **fields}, default=_pack)
         self._awaits_response = True
         try:
-            self._socket.send_binary(msgpack.packb({"type": kind, **fields}, default=_pack))
+            self._socket.send_binary(message)
         except (OSError, WebSocketException) as error:
             raise self._lost(error) from error
 

@@ -231,10 +231,19 @@ class Environments(unittest.TestCase):
         for _ in range(2):
             with self.assertRaisesRegex(softvt.ServerError, "step: the request before was interrupted; call reset first"):
                 env.step(action)
+        with self.assertRaisesRegex(softvt.ServerError, "get_state: the request before was interrupted; call reset first"):
+            env.get_state()
         again, info = env.reset(seed=1003)
         np.testing.assert_array_equal(again, first)
         self.assertEqual(info["step"], 0)
         np.testing.assert_array_equal(env.step(action)[0], after)
+        # A state is a way back as well, and what cannot be sent interrupts nothing.
+        kept = env.get_state()
+        env.begin_step(action)
+        np.testing.assert_array_equal(env.set_state(kept)[0], after)
+        with self.assertRaises((TypeError, OverflowError)):
+            env.reset(options={"task": {0}})
+        self.assertEqual(env.step(action)[4]["step"], 2)
 
     def test_after_an_interrupted_step_a_vector_is_reset(self):
         envs = softvt.SoftVTVectorEnv(2, script=short_suite(), obs="proprio")

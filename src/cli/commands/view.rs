@@ -84,7 +84,6 @@ pub(super) fn run(args: ViewArgs) -> Result<(), CliError> {
     };
     let runs: Vec<PreparedRun> = configs.iter().map(prepare).collect::<Result<_, _>>()?;
     files::create_folder(&args.out)?;
-    remove_earlier(&args.out)?;
     config.observer.work("simulating the episode");
     let simulate = |number: usize| runs[number].run_episode(job, true, &runs[number].controllers);
     let mut episodes = Vec::new();
@@ -99,8 +98,11 @@ pub(super) fn run(args: ViewArgs) -> Result<(), CliError> {
         let Some(states) = recording else { return Err(CliError::interrupted("")) };
         seen.push(SeenEpisode { record, states });
     }
+    if seen.len() < runs.len() {
+        return Err(CliError::interrupted(""));
+    }
+    remove_earlier(&args.out)?;
     match seen.len() {
-        count if count < runs.len() => Err(CliError::interrupted("")),
         1 => seen.pop().map_or(Ok(()), |episode| show_one(&args, &config, episode)),
         _ => show_several(&args, &config, seen),
     }
@@ -120,13 +122,28 @@ fn remove_earlier(dir: &Path) -> Result<(), CliError> {
     }
     remove_files(dir)?;
     for entry in entries(dir)? {
-        if entry.is_dir() {
+        if is_policy_folder(&entry)? {
             remove_files(&entry)?;
             // One with other files stays.
             let _ = std::fs::remove_dir(&entry);
         }
     }
     Ok(())
+}
+
+/// True for a folder with the stills of a policy, which has no page of its own.
+fn is_policy_folder(path: &Path) -> Result<bool, FileError> {
+    if path.is_symlink() || !path.is_dir() || path.join(episode_page::PAGE).exists() {
+        return Ok(false);
+    }
+    let names = entries(path)?;
+    Ok(MOMENTS.iter().all(|moment| names.iter().any(|path| is_still(path, moment))))
+}
+
+/// True for a still of a moment.
+fn is_still(path: &Path, moment: &str) -> bool {
+    let name = path.file_name().and_then(|name| name.to_str()).unwrap_or_default();
+    name.ends_with(".png") && name.strip_prefix(moment).is_some_and(|rest| rest.starts_with('_'))
 }
 
 /// Paths of what is in a folder.
@@ -138,15 +155,9 @@ fn entries(dir: &Path) -> Result<Vec<PathBuf>, FileError> {
 /// Removes the files that a view writes into a folder.
 fn remove_files(dir: &Path) -> Result<(), CliError> {
     let whole = [episode_page::PAGE, episode_page::VIDEO, episode_page::FRAME, ANIMATION, MCAP];
-    let is_still = |name: &str| {
-        name.ends_with(".png")
-            && MOMENTS
-                .iter()
-                .any(|moment| name.strip_prefix(moment).is_some_and(|rest| rest.starts_with('_')))
-    };
     for path in entries(dir)? {
         let name = path.file_name().and_then(|name| name.to_str()).unwrap_or_default();
-        if path.is_file() && (whole.contains(&name) || is_still(name)) {
+        if path.is_file() && (whole.contains(&name) || MOMENTS.iter().any(|moment| is_still(&path, moment))) {
             files::remove_if_present(&path)?;
         }
     }

@@ -97,7 +97,8 @@ impl CheckReport {
 /// # Errors
 /// `dataset.json` or the manifest is missing or unreadable.
 pub fn folder(root: &Path, scope: CheckScope) -> Result<CheckReport, DatasetError> {
-    let (card, entries) = (DatasetCard::read(root)?, manifest::read(root)?);
+    // The manifest says of other folders what they are.
+    let (entries, card) = (manifest::read(root)?, DatasetCard::read(root)?);
     let mut report = CheckReport::default();
     let mut files: BTreeMap<&str, Vec<&ManifestEntry>> = BTreeMap::new();
     for entry in &entries {

@@ -352,7 +352,8 @@ impl Judge {
         self.config.predicates.iter().zip(&self.predicates).map(|(predicate, state)| GoalPart {
             name: predicate.name.clone(),
             negated: state.is_negated,
-            holds: state.holds,
+            // A negated predicate counts as true for the goal until it has been absent for its time.
+            holds: state.holds && state.met_s.is_some(),
             met_s: state.met_s,
         })
     }
@@ -604,6 +605,7 @@ impl Judge {
                 if let PredicateRule::Rests { target, region, .. } = &predicate.rule
                     && let PredicateEvidence::Place(place) = &evidence.predicates[number]
                     && *target == index
+                    && !predicates[number].is_negated
                     && next.is_none_or(|(before, ..)| predicates[before].met_s.is_some())
                 {
                     next = Some((number, region, place));

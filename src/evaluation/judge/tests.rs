@@ -514,6 +514,16 @@ fn what_must_not_hold_must_be_gone_for_the_time_for_which_it_would_have_to_hold(
     assert_eq!(is_reached(&[(30, true), (24, false)]), (true, false));
     assert_eq!(is_reached(&[(30, true), (12, false), (3, true), (21, false)]), (false, true));
     assert!(!is_reached(&[(21, false)]).0);
+    // Nothing was there that had to leave.
+    assert!(!is_reached(&[(3, false)]).1);
+    // Of a sequence, the first step has not held, so that the second one is allowed.
+    let steps = vec![GoalNode::Predicate(0), GoalNode::Predicate(2)];
+    let mut judge = Judge::new(two_targets(GoalNode::All(vec![
+        GoalNode::None(vec![GoalNode::Sequence(steps)]),
+        GoalNode::Predicate(1),
+    ])));
+    feed(&mut judge, 30, &[false, true], &[0.1, 0.1], Some(true));
+    assert!(judge.is_goal_reached());
     assert_eq!(is_reached(&[(24, false)]), (true, false));
 }
 

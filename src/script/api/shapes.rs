@@ -117,9 +117,7 @@ impl LuaShape {
 
     /// Checks that a wall leaves something of the inside free.
     fn check_shell(&self, lua: &Lua, wall: f64) -> mlua::Result<()> {
-        let thinnest = |bounds: Aabb| bounds.size().min();
-        if thinnest(self.shape().loose_bounds()) > 2.0 * wall || thinnest(self.shape().bounds()) > 2.0 * wall
-        {
+        if self.shape().loose_bounds().size().min() > 2.0 * wall {
             return Ok(());
         }
         let message = format!(
@@ -131,10 +129,11 @@ impl LuaShape {
 
     /// Checks that a bent shape does not reach the centre of its arc, or its own other end.
     fn check_bend(&self, lua: &Lua, along: Axis, towards: Axis, curvature: f64) -> mlua::Result<()> {
+        const ROUNDING: f64 = 1e-6;
         let overlaps = |bounds: Aabb| {
             let (i, k) = (along.index(), towards.index());
             let reach = (bounds.min[k] * curvature).max(bounds.max[k] * curvature);
-            reach >= 1.0 || bounds.size()[i] * curvature.abs() > TAU
+            reach > 1.0 + ROUNDING || bounds.size()[i] * curvature.abs() > TAU * (1.0 + ROUNDING)
         };
         if !overlaps(self.shape().loose_bounds()) || !overlaps(self.shape().bounds()) {
             return Ok(());
