@@ -131,9 +131,9 @@ fn remove_earlier(dir: &Path) -> Result<(), CliError> {
     Ok(())
 }
 
-/// True for a folder with the stills of a policy, which has no page of its own.
+/// True for a folder with the stills of a policy. Other than a view of its own, it has no picture of the result.
 fn is_policy_folder(path: &Path) -> Result<bool, FileError> {
-    if path.is_symlink() || !path.is_dir() || path.join(episode_page::PAGE).exists() {
+    if path.is_symlink() || !path.is_dir() || path.join(episode_page::FRAME).exists() {
         return Ok(false);
     }
     let names = entries(path)?;
