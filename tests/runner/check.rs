@@ -142,7 +142,7 @@ fn implausible_units_and_wide_objects_are_doubted() {
     );
     let misspelt = Small::default().text().replace(
         "name = \"cube\", shape",
-        "hints = { grasp_heigth_m = 0.01, grasp_height_m = 20, weight = 1 }, name = \"cube\", shape",
+        "hints = { grasp_heigth_m = 0.01, grasp_width_m = 20, weight = 1 }, name = \"cube\", shape",
     );
     let misspelt = warnings(&Project::new(&[("x.lua", &misspelt)]));
     assert!(
@@ -152,7 +152,7 @@ fn implausible_units_and_wide_objects_are_doubted() {
         "{misspelt}"
     );
     assert!(!misspelt.contains("weight"), "{misspelt}");
-    let beside = "asset cube: hints.grasp_height_m is 20000 mm, and the object is 40 × 40 × 40 mm; lengths are in metres";
+    let beside = "asset cube: hints.grasp_width_m is 20000 mm, and the object is 40 × 40 × 40 mm; lengths are in metres";
     assert!(misspelt.contains(beside), "{misspelt}");
     let ball = "softvt.shape.sphere { radius = 0.02 }";
     let text = Small::default()
