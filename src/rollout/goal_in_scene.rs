@@ -292,7 +292,7 @@ impl Finder<'_> {
         Err(EpisodeError::JointRange { task: self.task.id, name: name.to_owned(), lower, upper, placed_at })
     }
 
-    /// A joint within what `range` makes of its limits, with a rounding error. A range that includes a limit is open
+    /// The subject for a joint in the range that `range` derives from its limits. A range that includes a limit is open
     /// at it.
     fn joint(&self, name: &str, range: impl Fn([f64; 2]) -> [f64; 2]) -> Result<Subject, EpisodeError> {
         const ROUNDING: f64 = 1e-4;
