@@ -54,7 +54,7 @@ fn a_joint_without_limits_or_with_wrong_ones_is_refused_at_its_line() {
     );
     assert_eq!(
         joint("softvt.hinge { axis = { 0, 0, 1 }, origin = { 0, 0, 0 },\nlower = -1 }"),
-        "suites/x.lua:4: hinge.upper: missing; expected radians"
+        "suites/x.lua:4: hinge.upper: missing; expected radians in -6.2832..6.2832"
     );
     assert_eq!(
         joint("softvt.slider { axis = { 0, -1, 0 }, lower = 0,\nupper = -0.1 }"),
