@@ -8,12 +8,13 @@ use softvt_common::text::{format_number, is_misspelt};
 use softvt_geometry::pieces::SeparatePieces;
 use softvt_robot::gripper::MAX_WIDTH;
 use softvt_scene::{
-    Asset, Body, EXPERT_HINTS, GRASP_HEIGHT_HINT, GRASP_WIDTH_HINT, Object, Scene, SoftMaterial,
+    Asset, Body, Camera, CameraMount, EXPERT_HINTS, GRASP_HEIGHT_HINT, GRASP_WIDTH_HINT, Object, Scene,
+    SoftMaterial,
 };
 
 /// Warnings about a scene of a task, one line each: materials, soft bodies of few voxels, bodies of several pieces or
 /// off their axis, hints with misspelt names, a target that the gripper cannot grasp, objects outside of the workspace,
-/// and a budget below what the goal takes.
+/// cameras that do not show what the goal names, and a budget below what the goal takes.
 pub fn scene_warnings(task: &Task, scene: &Scene, cache: &AssetCache) -> BTreeSet<String> {
     let warnings = |asset: &Asset| {
         let name = asset.name.clone();
@@ -31,12 +32,11 @@ pub fn scene_warnings(task: &Task, scene: &Scene, cache: &AssetCache) -> BTreeSe
     let targets = task.targets();
     let targets = scene.objects.iter().filter(|object| targets.contains(&object.name.as_str()));
     all.extend(targets.clone().filter_map(|target| width_warning(&target.asset)));
-    all.extend(targets.filter_map(|target| workspace_warning(scene, target, cache)));
     let goals = task.goal.predicates();
     let is_place = |object: &&Object| goals.iter().any(|goal| goal.target() == Some(&object.name));
-    all.extend(
-        scene.objects.iter().filter(is_place).filter_map(|place| workspace_warning(scene, place, cache)),
-    );
+    let named: Vec<&Object> = targets.chain(scene.objects.iter().filter(is_place)).collect();
+    all.extend(named.iter().filter_map(|object| workspace_warning(scene, object, cache)));
+    all.extend(scene.cameras.iter().filter_map(|camera| view_warning(camera, &named, cache)));
     all.extend(budget_warning(task));
     all
 }
@@ -93,6 +93,27 @@ fn workspace_warning(scene: &Scene, object: &Object, cache: &AssetCache) -> Opti
     })
 }
 
+/// A warning about a camera of the world that shows none of the objects that the goal names.
+fn view_warning(camera: &Camera, objects: &[&Object], cache: &AssetCache) -> Option<String> {
+    let shows = |object: &&Object| {
+        let bounds = cache.bounds(&object.asset.shape);
+        let centre_w = object.pose_w.transform_point(&bounds.centre().into());
+        camera.can_show(&camera.pose.inverse_transform_point(&centre_w).coords, 0.5 * bounds.size().norm())
+    };
+    (camera.mount == CameraMount::World && !objects.is_empty() && !objects.iter().any(shows)).then(|| {
+        let names: Vec<&str> = objects.iter().map(|object| object.name.as_str()).collect();
+        format!(
+            "camera {}: {} not in its view at the start; change where it is, its look_at, or its far, {} m",
+            camera.name,
+            match &names[..] {
+                [name] => format!("{name} is"),
+                names => format!("{} are", names.join(", ")),
+            },
+            format_number(camera.far_m)
+        )
+    })
+}
+
 /// Distance of the lowest point of an asset from z = 0, and share of its size by which its centre is off the z axis,
 /// that are likely not meant.
 const MAX_LIFT_M: f64 = 1e-3;
@@ -134,6 +155,15 @@ fn pieces_warning(asset: &Asset, cache: &AssetCache) -> Option<String> {
 /// The width where the stock experts grasp an object, if it exceeds the opening of the gripper.
 fn width_warning(asset: &Asset) -> Option<String> {
     let width = asset.grasp_width();
+    if width >= MAX_WIDTH && asset.hints.contains_key(GRASP_WIDTH_HINT) {
+        return Some(format!(
+            "asset {}: hints.{GRASP_WIDTH_HINT} is {:.0} mm, and the gripper opens {:.0} mm; give the width where it can be \
+             grasped",
+            asset.name,
+            1e3 * width,
+            1e3 * MAX_WIDTH
+        ));
+    }
     (width >= MAX_WIDTH).then(|| {
         format!(
             "asset {}: it is {:.0} mm wide, and the gripper opens {:.0} mm; make it smaller, or give the width where it \

@@ -1,6 +1,9 @@
 //! [`SuiteChecker`]: the scenes of the first episodes and the limits of a suite, without an episode.
 
-use std::{collections::BTreeSet, path::PathBuf};
+use std::{
+    collections::{BTreeMap, BTreeSet},
+    path::PathBuf,
+};
 
 use crate::{
     config::{ConfiguredScript, RunConfig},
@@ -10,11 +13,12 @@ use crate::{
     selection::select_episodes,
     suite_run::SuiteRun,
 };
-use softvt_benchmark::{ObjectType, Suite, Task};
-use softvt_common::{cancel, parallel};
+use softvt_benchmark::{ObjectType, ShiftValue, Suite, Task};
+use softvt_common::{cancel, parallel, text::format_number};
+use softvt_geometry::Vec3;
 use softvt_rollout::{AssetCache, SensorAssets, scene_warnings};
 use softvt_scene::{Body, Scene};
-use softvt_script::LoadedScript;
+use softvt_script::{LoadedScript, SceneChanges};
 
 /// Checks suites one after the other. Those that share assets load them once.
 pub struct SuiteChecker<'a> {
@@ -49,7 +53,8 @@ impl<'a> SuiteChecker<'a> {
             ..SuiteRun::new(self.config, self.script, suite, none, PathBuf::new())?
         };
         let jobs = EpisodeList::of_tasks(&tasks, episodes, None);
-        let found = check_scenes(&run, &self.scenes, &jobs)?;
+        let mut found = check_scenes(&run, &self.scenes, &jobs)?;
+        found.warnings.extend(changing_defaults(&run, &self.scenes, &jobs)?);
         self.config.observer.end();
         found.warnings.into_iter().for_each(&mut warn);
         let run = SuiteRun { jobs: select_episodes(self.config, suite, &tasks), ..run };
@@ -70,7 +75,41 @@ struct SceneFindings {
     warnings: BTreeSet<String>,
     /// Names of the soft assets whose material has no strain limit.
     without_strain: BTreeSet<String>,
+    /// Where each layout puts its objects in an episode, without shifts.
+    layouts: BTreeMap<LayoutEpisode, PlacedObjects>,
+    /// True if shifts change a scene or a prompt.
+    has_changed: bool,
 }
+
+#[derive(Clone, PartialEq, Eq, PartialOrd, Ord)]
+struct LayoutEpisode {
+    layout: String,
+    episode: u32,
+}
+
+/// The objects of a scene, as the layout of a task places them.
+struct PlacedObjects {
+    task: usize,
+    positions: BTreeMap<String, Vec3>,
+}
+
+impl PlacedObjects {
+    /// A warning about a layout of another task with the same name that places an object elsewhere.
+    fn conflict(&self, other: &Self, layout: &str) -> Option<String> {
+        let differs = |(name, at): &(&String, &Vec3)| {
+            other.positions.get(*name).is_some_and(|elsewhere| (elsewhere - *at).norm() > SAME_PLACE_M)
+        };
+        let (name, _) = self.positions.iter().find(differs)?;
+        Some(format!(
+            "tasks {} and {}: both layouts have the name {layout:?}, and place {name} differently; tasks with the same layout share \
+             their initial states, so give these two names",
+            self.task, other.task
+        ))
+    }
+}
+
+/// Distance of places that count as the same, m.
+const SAME_PLACE_M: f64 = 1e-6;
 
 fn check_scenes(run: &SuiteRun, scenes: &ScenePool, jobs: &EpisodeList) -> Result<SceneFindings, RunError> {
     let mut all = SceneFindings::default();
@@ -82,6 +121,12 @@ fn check_scenes(run: &SuiteRun, scenes: &ScenePool, jobs: &EpisodeList) -> Resul
         if !run.config.rigid_twin {
             warnings.extend(no_soft_target(run.suite, task, &setup.scene).map(of_task));
         }
+        let has_changed = setup.is_shifted();
+        let objects = setup.nominal.objects.iter();
+        let positions =
+            objects.map(|object| (object.name.clone(), object.pose_w.translation.vector)).collect();
+        let of_layout = LayoutEpisode { layout: task.layout.clone(), episode };
+        let layouts = [(of_layout, PlacedObjects { task: task.id, positions })].into();
         let soft = setup.scene.objects.iter().filter_map(|object| match &object.asset.body {
             Body::Soft(material) => Some((material, &object.asset.name)),
             _ => None,
@@ -89,7 +134,7 @@ fn check_scenes(run: &SuiteRun, scenes: &ScenePool, jobs: &EpisodeList) -> Resul
         let without_strain = soft.filter(|(material, _)| material.stable_strain().is_none());
         let without_strain = without_strain.map(|(_, name)| name.clone()).collect();
         warnings.extend(run.check_scene(task, episode, setup.scene, setup.predicates)?.map(of_task));
-        Ok(SceneFindings { warnings, without_strain })
+        Ok(SceneFindings { warnings, without_strain, layouts, has_changed })
     };
     let check = |position: usize| {
         let job = jobs.job(position);
@@ -101,9 +146,45 @@ fn check_scenes(run: &SuiteRun, scenes: &ScenePool, jobs: &EpisodeList) -> Resul
     parallel::run(jobs.len(), run.config.thread_count(), cancel::requested, check, |_, found| {
         all.warnings.extend(found.warnings);
         all.without_strain.extend(found.without_strain);
+        all.has_changed |= found.has_changed;
+        for (layout, placed) in found.layouts {
+            match all.layouts.get(&layout) {
+                Some(first) => all.warnings.extend(first.conflict(&placed, &layout.layout)),
+                None => drop(all.layouts.insert(layout, placed)),
+            }
+        }
         Ok(())
     })?;
+    if !all.has_changed && jobs.len() > 0 {
+        run.refuse_shifts_without_effect()?;
+    }
     Ok(all)
+}
+
+/// Warnings about shifts of a suite that change its first scene though they have their default value.
+fn changing_defaults(
+    run: &SuiteRun,
+    scenes: &ScenePool,
+    jobs: &EpisodeList,
+) -> Result<Vec<String>, RunError> {
+    let mut warnings = Vec::new();
+    if jobs.len() == 0 {
+        return Ok(warnings);
+    }
+    let EpisodeJob { task, episode } = jobs.job(0);
+    for shift in &run.suite.shifts {
+        let value = ShiftValue { name: shift.name.clone(), value: shift.default };
+        let changes = SceneChanges { shifts: vec![value], ..run.changes() };
+        let setup = scenes.with(|builder| builder.build(&run.episode_id(task, episode), &changes))??;
+        if setup.is_shifted() {
+            warnings.push(format!(
+                "shift {}: its default, {}, changes the scene; give the value that changes nothing",
+                shift.name,
+                format_number(shift.default)
+            ));
+        }
+    }
+    Ok(warnings)
 }
 
 /// A warning about a task of a suite of soft objects whose goal moves none.

@@ -479,7 +479,7 @@ impl<'a> SuiteRun<'a> {
         for task in self.jobs.tasks() {
             let first = self.jobs.episodes_of(task.id).next().unwrap_or(0);
             let opened = self.open_episode(&self.episode_id(task, first))?;
-            has_changed |= opened.scene != opened.nominal || opened.prompt != opened.nominal_prompt;
+            has_changed |= opened.is_shifted();
             self.check_object_type(task, &opened.nominal)?;
             let scene = Arc::new(opened.scene.clone());
             self.check_declared_cameras(&scene, task)?;
@@ -502,7 +502,7 @@ impl<'a> SuiteRun<'a> {
 
     /// Refuses shifts that change neither the scene nor the prompt of any task, unless their values are the nominal
     /// ones.
-    fn refuse_shifts_without_effect(&self) -> Result<(), RunError> {
+    pub(crate) fn refuse_shifts_without_effect(&self) -> Result<(), RunError> {
         let is_nominal = |shift: &ShiftValue| {
             let declared = self.suite.shifts.iter().find(|declared| declared.name == shift.name);
             declared.is_some_and(|declared| declared.default == shift.value)

@@ -119,6 +119,19 @@ impl Camera {
         [[focal, 0.0, 0.5 * self.width as f64], [0.0, focal, 0.5 * self.height as f64], [0.0, 0.0, 1.0]]
     }
 
+    /// Whether a ball may be in the image, given its centre in the frame of the camera, m, and its radius, m.
+    pub fn can_show(&self, centre_c: &Vec3, radius: f64) -> bool {
+        let depth = -centre_c.z;
+        let half_height = (0.5 * self.fovy_rad).tan();
+        let half_width = half_height * self.width as f64 / self.height as f64;
+        // Distance from the plane through the camera and an edge of the image.
+        let is_beyond = |along: f64, slope: f64| along.abs() - slope * depth > radius * slope.hypot(1.0);
+        depth + radius > self.near_m
+            && depth - radius < self.far_m
+            && !is_beyond(centre_c.x, half_width)
+            && !is_beyond(centre_c.y, half_height)
+    }
+
     /// The same camera with a square image of `edge` pixels.
     #[must_use]
     pub fn with_edge(mut self, edge: usize) -> Self {

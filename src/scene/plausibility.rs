@@ -6,8 +6,10 @@ use softvt_physics::{STANDARD_GRAVITY, fem::ElasticMaterial};
 
 /// Smallest plausible Young's modulus, Pa: soft gels have some hundred.
 const MIN_YOUNGS_PA: f64 = 300.0;
-/// Largest plausible Young's modulus of a body that deforms visibly in a hand, Pa.
-const MAX_YOUNGS_PA: f64 = 1e9;
+/// Largest plausible Young's modulus of a soft body, Pa: that of hard rubber.
+const MAX_YOUNGS_PA: f64 = 1e7;
+/// Largest plausible strain that a soft body bears.
+const MAX_STRAIN: f64 = 0.8;
 /// Plausible densities, kg/m³: from light foam to osmium.
 const MIN_DENSITY: f64 = 5.0;
 const MAX_DENSITY: f64 = 23_000.0;
@@ -19,8 +21,13 @@ impl Asset {
     /// Warnings about its material, one sentence each.
     pub fn warnings(&self) -> Vec<String> {
         match &self.body {
-            Body::Soft(SoftMaterial { elastic, .. }) => {
-                let units = [youngs_warning(elastic.youngs_pa()), density_warning(elastic.density())];
+            Body::Soft(SoftMaterial { elastic, collapse_strain, damage_strain, .. }) => {
+                let units = [
+                    youngs_warning(elastic.youngs_pa()),
+                    density_warning(elastic.density()),
+                    strain_warning("collapse_strain", *collapse_strain),
+                    strain_warning("damage_strain", *damage_strain),
+                ];
                 units.into_iter().flatten().chain(self.sag_warning(elastic)).collect()
             }
             Body::Rigid { density } => density_warning(*density).into_iter().collect(),
@@ -64,8 +71,16 @@ fn youngs_warning(pascals: f64) -> Option<String> {
         ));
     }
     (pascals > MAX_YOUNGS_PA).then(|| {
-        format!("youngs_pa is {pascals} Pa, stiffer than plastic; give it in Pa, or use softvt.rigid for a hard object")
+        format!("youngs_pa is {pascals} Pa, stiffer than rubber; give it in Pa, or use softvt.rigid for a hard object")
     })
+}
+
+fn strain_warning(name: &str, strain: Option<f64>) -> Option<String> {
+    let strain = strain.filter(|strain| *strain > MAX_STRAIN)?;
+    let (percent, converted) = (format_number(1e2 * strain), format_number(1e-2 * strain));
+    Some(format!(
+        "{name} is {strain}, a compression by {percent} %; did you mean {strain} %, {name} = {converted}?"
+    ))
 }
 
 fn density_warning(density: f64) -> Option<String> {
@@ -111,6 +126,12 @@ mod tests {
         assert!(both[0].contains("did you mean 40 kPa, youngs_pa = 40000?"), "{both:?}");
         assert!(both[1].contains("did you mean 0.3 g/cm³, density = 300?"), "{both:?}");
         assert_eq!(warnings(1e3, 20.0), [""; 0], "a soft, light foam");
+        assert!(warnings(6e7, 300.0)[0].contains("stiffer than rubber"));
+        assert_eq!(strain_warning("damage_strain", Some(0.6)), None);
+        let doubted = strain_warning("collapse_strain", Some(1.0));
+        let expected =
+            "collapse_strain is 1, a compression by 100 %; did you mean 1 %, collapse_strain = 0.01?";
+        assert_eq!(doubted.as_deref(), Some(expected));
     }
 
     #[test]

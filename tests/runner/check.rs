@@ -166,6 +166,63 @@ fn implausible_units_and_wide_objects_are_doubted() {
 }
 
 #[test]
+fn a_camera_that_shows_nothing_of_the_goal_is_a_warning() {
+    let of = |change: &str| {
+        let text = Small::default().text();
+        let changed = text.replace("(scene)\n", &format!("(scene) scene:camera('third_person').{change}\n"));
+        assert_ne!(text, changed);
+        warnings(&Project::new(&[("x.lua", &changed)]))
+    };
+    let near_sighted = of("far = 0.3");
+    let expected = "camera third_person: cube, post are not in its view at the start; change where it is, its look_at, \
+                    or its far, 0.3 m";
+    assert!(near_sighted.contains(expected), "{near_sighted}");
+    assert!(of("position = { 0.6, 0, -2 }").contains("not in its view"));
+    assert!(!of("far = 3").contains("in its view"));
+}
+
+#[test]
+fn shifts_whose_default_changes_the_scene_or_that_change_nothing_are_told() {
+    let of = |change: &str| {
+        let shift = format!(
+            "shifts = {{ softvt.shift {{ name = 'stiff', default = 1, min = 0.1, max = 3, apply = function(scene, value)\n\
+             {change} end }} }},\ntasks = {{"
+        );
+        let text = Small::default().text();
+        let shifted = text.replacen("tasks = {", &shift, 1);
+        assert_ne!(text, shifted);
+        Project::new(&[("x.lua", &shifted)])
+    };
+    let object = "scene.goal_object.youngs_pa = scene.goal_object.youngs_pa";
+    let expected = "shift stiff: its default, 1, changes the scene; give the value that changes nothing";
+    assert!(warnings(&of(&format!("{object} * (value + 1)"))).contains(expected));
+    let sound = of(&format!("{object} * value"));
+    assert!(!warnings(&sound).contains("shift stiff"));
+    let with_value = |project: &Project| {
+        let run = project.run("x.lua").configured(|config| {
+            config.shifts = vec![ShiftValue { name: "stiff".into(), value: 0.5 }];
+        });
+        run.check().map_err(|error| project.relative(error))
+    };
+    assert!(with_value(&sound).is_ok());
+    let message = with_value(&of("local y = scene.goal_object.youngs_pa * value")).unwrap_err();
+    assert!(message.contains("changes nothing in suite") && message.contains("stiff=0.5"), "{message}");
+}
+
+#[test]
+fn two_layouts_of_one_name_that_differ_are_a_warning() {
+    let of = |y: f64| {
+        let layout = |y: f64| {
+            format!(
+                "softvt.layout('same', function(scene) scene:add {{ name = 'floor', asset = floor, position = {{ 0, {y}, 0 }} }} end)"
+            )
+        };
+        (layout(0.0), layout(y))
+    };
+    assert_ne!(of(0.0).1, of(0.1).1);
+}
+
+#[test]
 fn a_scene_of_too_many_nodes_is_refused_with_its_cost() {
     let of_resolution = |resolution: u32| {
         let material = format!(

@@ -134,7 +134,7 @@ fn check_asset(lua: &Lua, record: &Record, asset: &Table) -> mlua::Result<()> {
         return find_calibration(lua, &asset.raw_get::<String>("name")?);
     }
     let message = format!(
-        "asset.friction: dynamic_mu {dynamic_mu} is above static_mu {static_mu}; give the larger one to static_mu"
+        "asset.friction: dynamic_mu {dynamic_mu} is above static_mu {static_mu}; set both, the larger one as static_mu"
     );
     Err(fail(lua, message))
 }

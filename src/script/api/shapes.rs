@@ -127,6 +127,33 @@ impl LuaShape {
         Err(fail(lua, message))
     }
 
+    /// Checks that a cut, of which the edge is rounded by `blend`, may remove something.
+    fn check_cut(&self, lua: &Lua, cut: &Self, blend: f64) -> mlua::Result<()> {
+        if self.shape().loose_bounds().loosened(blend).intersects(&cut.shape().loose_bounds()) {
+            return Ok(());
+        }
+        let message = "shape:subtract: the other shape lies outside of this one, so that nothing is removed; lengths are in metres";
+        Err(fail(lua, message.to_owned()))
+    }
+
+    /// Checks that a mask leaves some of the relief that `method` adds.
+    fn check_mask(&self, lua: &Lua, method: &str, mask: Option<&Ramp>) -> mlua::Result<()> {
+        let Some(Ramp { axis, from, to }) = mask else { return Ok(()) };
+        let bounds = self.shape().loose_bounds();
+        let (low, high) = (bounds.min[axis.index()], bounds.max[axis.index()]);
+        let has_weight = if to > from { high > *from } else { low < *from };
+        if has_weight {
+            return Ok(());
+        }
+        let message = format!(
+            "shape:{method}.mask: its weight is 0 on the whole shape, which reaches from {} to {} m along {}",
+            format_number(low),
+            format_number(high),
+            ["x", "y", "z"][axis.index()]
+        );
+        Err(fail(lua, message))
+    }
+
     /// Checks that a bent shape does not reach the centre of its arc, or its own other end.
     fn check_bend(&self, lua: &Lua, along: Axis, towards: Axis, curvature: f64) -> mlua::Result<()> {
         const ROUNDING: f64 = 1e-6;
@@ -319,6 +346,7 @@ class! {
             }
             /// Cuts another shape out of this one; blend (m) rounds the edge.
             fn subtract(lua, this, cut: LuaShape, blend: Option<f64> = METRES) -> ["softvt.Shape"] {
+                this.check_cut(lua, &cut, blend.unwrap_or(0.0))?;
                 let shape = match blend {
                     None => this.copy().subtract(cut.copy()),
                     Some(blend) => this.copy().smooth_subtract(cut.copy(), blend),
@@ -392,6 +420,10 @@ class! {
                 /// Weight of their height; 1 everywhere by default.
                 mask: Option<Ramp>;
             } -> ["softvt.Shape"] {
+                if count == 0 && pitch.is_infinite() && radial_pitch.is_infinite() {
+                    return Err(fail(lua, "shape:ridges: there are none; give count, pitch or radial_pitch".to_owned()));
+                }
+                this.check_mask(lua, "ridges", mask.as_ref())?;
                 let ridges = Ridges { axis, height, count, pitch, radial_pitch, phase, sharpness, mask };
                 this.derived(lua, this.copy().displaced(SurfaceRelief::Ridges(ridges)), &[])?
             }
@@ -408,6 +440,7 @@ class! {
                 /// Weight of their height; 1 everywhere by default.
                 mask: Option<Ramp>;
             } -> ["softvt.Shape"] {
+                this.check_mask(lua, "bumps", mask.as_ref())?;
                 let bumps = Bumps { height, radius, spacing, seed, mask };
                 this.derived(lua, this.copy().displaced(SurfaceRelief::Bumps(bumps)), &[])?
             }

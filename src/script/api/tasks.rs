@@ -68,7 +68,7 @@ record! {
         budget_steps: Option<u32> = Type::Integer(Range::closed(1.0, 100_000.0));
     }
     /// A change of the scene that a run can request with --shift name=value. Limits of D stay those of the assets.
-    ShiftSpec: "softvt.Shift" as "shift", constructor "softvt.shift" {
+    ShiftSpec: "softvt.Shift" as "shift", constructor "softvt.shift", relations check_shift_range {
         /// Name on the command line.
         name: String;
         /// Unit of the value.
@@ -287,6 +287,22 @@ functions! {
             }
         }
     }
+}
+
+/// Checks that a shift's range is one and holds its default.
+fn check_shift_range(lua: &Lua, record: &Record, table: &Table) -> mlua::Result<()> {
+    let bound =
+        |key: &str, open: f64| Ok::<_, mlua::Error>(table.raw_get::<Option<f64>>(key)?.unwrap_or(open));
+    let (min, max) = (bound("min", f64::NEG_INFINITY)?, bound("max", f64::INFINITY)?);
+    let default: f64 = table.raw_get("default")?;
+    let (key, message) = if min > max {
+        ("min", format!("{min} is above max, {max}; swap them"))
+    } else if !(min..=max).contains(&default) {
+        ("default", format!("{default} is outside of min and max; expected the value that changes nothing"))
+    } else {
+        return Ok(());
+    };
+    Err(error_at_key(lua, record.label, &ValidationError { path: vec![key.into()], message }))
 }
 
 fn check_variation(lua: &Lua, record: &Record, table: &Table) -> mlua::Result<()> {

@@ -39,6 +39,9 @@ use softvt_robot::{gripper::MAX_WIDTH, panda};
 use softvt_rollout::{MeasuredMetric, StatePredicate};
 use softvt_scene::{Body, CameraSettings, Scene, SceneVariation};
 
+/// Rounding of lengths, m, and of the numbers of quaternions.
+const ROUNDING: f64 = 1e-9;
+
 /// Changes of a scene between its layout and the start of an episode, applied in the order of the fields. The variation
 /// comes before them: limits and initial states are those of the varied scene.
 #[derive(Clone, Debug, Default)]
@@ -81,6 +84,24 @@ impl EpisodeSetup {
     /// If the suite, the task or a shift is unknown, or the script fails.
     pub fn open(loaded: &LoadedScript, id: &EpisodeId, changes: &SceneChanges) -> Result<Self, ScriptError> {
         SceneBuilder::open(loaded)?.build(id, changes)
+    }
+
+    /// Whether the shifts change the scene or the prompt. Rounding of camera poses, and the lines that set something, do not
+    /// count.
+    pub fn is_shifted(&self) -> bool {
+        let mut scene = self.scene.clone();
+        for (camera, nominal) in scene.cameras.iter_mut().zip(&self.nominal.cameras) {
+            camera.set_at.clone_from(&nominal.set_at);
+            let offset = camera.pose.translation.vector - nominal.pose.translation.vector;
+            let turn = camera.pose.rotation.coords - nominal.pose.rotation.coords;
+            if offset.norm().max(turn.norm()) < ROUNDING {
+                camera.pose = nominal.pose;
+            }
+        }
+        for (object, nominal) in scene.objects.iter_mut().zip(&self.nominal.objects) {
+            object.placed_at.clone_from(&nominal.placed_at);
+        }
+        self.prompt != self.nominal_prompt || scene != self.nominal
     }
 
     /// The controller that runs the expert of the task; `None` if the task has no expert.
