@@ -75,37 +75,18 @@ struct SceneFindings {
     warnings: BTreeSet<String>,
     /// Names of the soft assets whose material has no strain limit.
     without_strain: BTreeSet<String>,
-    /// Where each layout puts its objects in an episode, without shifts.
-    layouts: BTreeMap<LayoutEpisode, PlacedObjects>,
+    /// Where each layout places its objects, without shifts.
+    layouts: BTreeMap<LayoutOfTask, BTreeMap<String, Vec3>>,
     /// True if shifts change a scene or a prompt.
     has_changed: bool,
 }
 
-#[derive(Clone, PartialEq, Eq, PartialOrd, Ord)]
-struct LayoutEpisode {
+/// A layout in an episode of a task.
+#[derive(PartialEq, Eq, PartialOrd, Ord)]
+struct LayoutOfTask {
     layout: String,
     episode: u32,
-}
-
-/// The objects of a scene, as the layout of a task places them.
-struct PlacedObjects {
     task: usize,
-    positions: BTreeMap<String, Vec3>,
-}
-
-impl PlacedObjects {
-    /// A warning about a layout of another task with the same name that places an object elsewhere.
-    fn conflict(&self, other: &Self, layout: &str) -> Option<String> {
-        let differs = |(name, at): &(&String, &Vec3)| {
-            other.positions.get(*name).is_some_and(|elsewhere| (elsewhere - *at).norm() > SAME_PLACE_M)
-        };
-        let (name, _) = self.positions.iter().find(differs)?;
-        Some(format!(
-            "tasks {} and {}: both layouts have the name {layout:?}, and place {name} differently; tasks with the same layout share \
-             their initial states, so give these two names",
-            self.task, other.task
-        ))
-    }
 }
 
 /// Distance of places that count as the same, m.
@@ -125,8 +106,8 @@ fn check_scenes(run: &SuiteRun, scenes: &ScenePool, jobs: &EpisodeList) -> Resul
         let objects = setup.nominal.objects.iter();
         let positions =
             objects.map(|object| (object.name.clone(), object.pose_w.translation.vector)).collect();
-        let of_layout = LayoutEpisode { layout: task.layout.clone(), episode };
-        let layouts = [(of_layout, PlacedObjects { task: task.id, positions })].into();
+        let placed_by = LayoutOfTask { layout: task.layout.clone(), episode, task: task.id };
+        let layouts = [(placed_by, positions)].into();
         let soft = setup.scene.objects.iter().filter_map(|object| match &object.asset.body {
             Body::Soft(material) => Some((material, &object.asset.name)),
             _ => None,
@@ -147,18 +128,35 @@ fn check_scenes(run: &SuiteRun, scenes: &ScenePool, jobs: &EpisodeList) -> Resul
         all.warnings.extend(found.warnings);
         all.without_strain.extend(found.without_strain);
         all.has_changed |= found.has_changed;
-        for (layout, placed) in found.layouts {
-            match all.layouts.get(&layout) {
-                Some(first) => all.warnings.extend(first.conflict(&placed, &layout.layout)),
-                None => drop(all.layouts.insert(layout, placed)),
-            }
-        }
+        all.layouts.extend(found.layouts);
         Ok(())
     })?;
-    if !all.has_changed && jobs.len() > 0 {
+    all.warnings.extend(layout_conflicts(&all.layouts));
+    if !all.has_changed && !jobs.is_empty() {
         run.refuse_shifts_without_effect()?;
     }
     Ok(all)
+}
+
+/// Warnings about layouts of two tasks with the same name that place an object differently.
+fn layout_conflicts(layouts: &BTreeMap<LayoutOfTask, BTreeMap<String, Vec3>>) -> Vec<String> {
+    let mut warnings = Vec::new();
+    for ((one, places), (other, other_places)) in layouts.iter().zip(layouts.iter().skip(1)) {
+        if one.layout != other.layout || one.episode != other.episode {
+            continue;
+        }
+        let is_elsewhere = |(name, at): &(&String, &Vec3)| {
+            other_places.get(*name).is_some_and(|other_at| (other_at - *at).norm() > SAME_PLACE_M)
+        };
+        if let Some((name, _)) = places.iter().find(is_elsewhere) {
+            warnings.push(format!(
+                "tasks {} and {}: both layouts have the name {:?}, and place {name} differently; tasks with the same layout share \
+                 their initial states, so give these two names",
+                one.task, other.task, one.layout
+            ));
+        }
+    }
+    warnings
 }
 
 /// Warnings about shifts of a suite that change its first scene though they have their default value.
@@ -168,7 +166,7 @@ fn changing_defaults(
     jobs: &EpisodeList,
 ) -> Result<Vec<String>, RunError> {
     let mut warnings = Vec::new();
-    if jobs.len() == 0 {
+    if jobs.is_empty() {
         return Ok(warnings);
     }
     let EpisodeJob { task, episode } = jobs.job(0);

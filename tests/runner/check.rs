@@ -199,10 +199,7 @@ fn shifts_whose_default_changes_the_scene_or_that_change_nothing_are_told() {
     let sound = of(&format!("{object} * value"));
     assert!(!warnings(&sound).contains("shift stiff"));
     let with_value = |project: &Project| {
-        let run = project.run("x.lua").configured(|config| {
-            config.shifts = vec![ShiftValue { name: "stiff".into(), value: 0.5 }];
-        });
-        run.check().map_err(|error| project.relative(error))
+        project.run("x.lua").shift("stiff", 0.5).check().map_err(|error| project.relative(error))
     };
     assert!(with_value(&sound).is_ok());
     let message = with_value(&of("local y = scene.goal_object.youngs_pa * value")).unwrap_err();
@@ -211,15 +208,23 @@ fn shifts_whose_default_changes_the_scene_or_that_change_nothing_are_told() {
 
 #[test]
 fn two_layouts_of_one_name_that_differ_are_a_warning() {
-    let of = |y: f64| {
-        let layout = |y: f64| {
-            format!(
-                "softvt.layout('same', function(scene) scene:add {{ name = 'floor', asset = floor, position = {{ 0, {y}, 0 }} }} end)"
-            )
-        };
-        (layout(0.0), layout(y))
+    let of = |cube_y: f64| {
+        let text = Small::default().text();
+        let start = text.find("local layout").expect("a layout");
+        let (end, task) =
+            (text.find("return").expect("a suite"), text.find("  softvt.task").expect("a task"));
+        let other = text[start..end]
+            .replace("local layout", "local other")
+            .replace("0, 0.1", &format!("0, {cube_y}"));
+        let second = text[task..].replace("wait\"", "wait longer\"").replace("= layout", "= other");
+        let tasks = text[task..].trim_end().trim_end_matches("} }");
+        let text = format!("{}{other}{}{tasks}{second}", &text[..end], &text[end..task]);
+        warnings(&Project::new(&[("x.lua", &text)]))
     };
-    assert_ne!(of(0.0).1, of(0.1).1);
+    let expected = "tasks 0 and 1: both layouts have the name \"one\", and place cube differently";
+    let differing = of(0.12);
+    assert!(differing.contains(expected), "{differing}");
+    assert!(!of(0.1).contains("layouts have the name"));
 }
 
 #[test]

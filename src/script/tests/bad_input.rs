@@ -279,6 +279,44 @@ fn an_impossible_material_is_refused() {
 }
 
 #[test]
+fn a_cut_or_a_relief_that_changes_nothing_is_refused() {
+    let of = |rest: &str| error_of(&format!("softvt.shape.box {{ size = {{ 0.04, 0.04, 0.04 }} }}:{rest}"));
+    let ball = "softvt.shape.sphere { radius = 0.005 }";
+    assert_eq!(
+        of(&format!("subtract({ball}:translate(0, 0, 17))")),
+        "suites/x.lua:1: shape:subtract: the other shape lies outside of this one, so that nothing is removed; lengths are in \
+         metres"
+    );
+    assert_eq!(
+        of("ridges { height = 0.003 }"),
+        "suites/x.lua:1: shape:ridges: there are none; give count, pitch or radial_pitch"
+    );
+    let masked = "mask = { axis = 'z', from = 4, to = 10 }";
+    assert_eq!(
+        of(&format!("ridges {{ height = 0.003, count = 8, {masked} }}")),
+        "suites/x.lua:1: shape:ridges.mask: its weight is 0 on the whole shape, which reaches from -0.02 to 0.02 m along z"
+    );
+    assert!(
+        of(&format!("bumps {{ height = 1e-3, radius = 1e-3, spacing = 4e-3, {masked} }}"))
+            .contains("bumps.mask")
+    );
+}
+
+#[test]
+fn a_shift_whose_default_is_out_of_its_range_is_refused() {
+    let of =
+        |range: &str| error_of(&format!("softvt.shift {{ name = 's', {range}, apply = function() end }}"));
+    assert_eq!(
+        of("default = 1, min = 2"),
+        "suites/x.lua:1: shift.default: 1 is outside of min and max; expected the value that changes nothing"
+    );
+    assert_eq!(
+        of("default = 1, min = 3, max = 0.1"),
+        "suites/x.lua:1: shift.min: 3 is above max, 0.1; swap them"
+    );
+}
+
+#[test]
 fn invalid_meshes_are_refused_with_their_file() {
     let tetrahedron = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\n";
     let project = Project::new(&[
