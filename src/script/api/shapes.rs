@@ -421,7 +421,7 @@ class! {
                 mask: Option<Ramp>;
             } -> ["softvt.Shape"] {
                 if count == 0 && pitch.is_infinite() && radial_pitch.is_infinite() {
-                    return Err(fail(lua, "shape:ridges: there are none; give count, pitch or radial_pitch".to_owned()));
+                    return Err(fail(lua, "shape:ridges: without a count, pitch or radial_pitch it adds nothing; give one".to_owned()));
                 }
                 this.check_mask(lua, "ridges", mask.as_ref())?;
                 let ridges = Ridges { axis, height, count, pitch, radial_pitch, phase, sharpness, mask };

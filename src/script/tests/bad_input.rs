@@ -289,7 +289,7 @@ fn a_cut_or_a_relief_that_changes_nothing_is_refused() {
     );
     assert_eq!(
         of("ridges { height = 0.003 }"),
-        "suites/x.lua:1: shape:ridges: there are none; give count, pitch or radial_pitch"
+        "suites/x.lua:1: shape:ridges: without a count, pitch or radial_pitch it adds nothing; give one"
     );
     let masked = "mask = { axis = 'z', from = 4, to = 10 }";
     assert_eq!(
