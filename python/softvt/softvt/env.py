@@ -5,6 +5,7 @@ import math
 import os
 import shutil
 import time
+import warnings
 import weakref
 from collections import deque
 from collections.abc import Iterable, Mapping, Sequence
@@ -262,6 +263,7 @@ class SoftVTEnv(gymnasium.Env[Observation, np.ndarray]):
         self._progress = 0.0
         self._last: Step | None = None
         self._pending = ""
+        self._has_warned = False
         # True while the only episode of the server is that of `_probe`.
         self._has_probe = False
 
@@ -381,7 +383,9 @@ class SoftVTEnv(gymnasium.Env[Observation, np.ndarray]):
         reward = self._reward_of(response, state)
         terminated, truncated = bool(response["terminated"]), bool(response["truncated"])
         if self._freezes and (terminated or truncated):
-            self._last = (observation, 0.0, terminated, truncated, info)
+            # Its costs have been counted.
+            frozen = {key: 0.0 if key == "cost" or key.startswith("cost_") else value for key, value in info.items()}
+            self._last = (observation, 0.0, terminated, truncated, frozen)
         return observation, reward, terminated, truncated, info
 
     def get_state(self) -> dict[str, Any]:
@@ -422,7 +426,21 @@ class SoftVTEnv(gymnasium.Env[Observation, np.ndarray]):
             self._scene = _read_scene(raw)
         observation, state = self._observe(response, is_first=True)
         self._progress = progress(state, self._verdict) if state is not None else 0.0
+        self._warn_of_missing_limits()
         return observation, self._info(raw, None)
+
+    def _warn_of_missing_limits(self) -> None:
+        """Warns once of a soft object without a limit, whose deformation has no cost and is never safe."""
+        if self._has_warned or not (self._has_cost or self._reward == "safety"):
+            return
+        judged = [self._verdict, *self._verdict.get("targets", ())]
+        if any(one.get("d_peak") is not None and one.get("tau") is None for one in judged):
+            self._has_warned = True
+            warnings.warn(
+                f"suite {self._suite}, task {self.task}: an object of the goal has no limit τ, so that no episode is safe and no deformation "
+                "costs; calibrate it (docs/calibration.md)",
+                stacklevel=2,
+            )
 
     def _needs_state(self) -> bool:
         return self._reward == "staged" or (self._parts is not None and "state" in self._parts)

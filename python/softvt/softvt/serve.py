@@ -60,6 +60,7 @@ class Client:
         self._server = server
         self._socket: Any = None
         self._awaits_response = True
+        self._process = os.getpid()
         header = {"Authorization": f"Bearer {token}"} if token else {}
         try:
             self._socket = create_connection(url, header=header)
@@ -90,6 +91,10 @@ class Client:
         """Sends a request without waiting. It has to be followed by a `receive` before the next one."""
         if self._socket is None:
             raise ServerError("the connection is closed")
+        if os.getpid() != self._process:
+            raise ServerError(
+                f"{kind}: the connection belongs to process {self._process}, of which this one is a fork; make the environment in this process"
+            )
         if self._awaits_response:
             raise ServerError(f"{kind}: the request before was interrupted; make a new connection")
         message = msgpack.packb({"type": kind, **fields}, default=_pack)
@@ -118,7 +123,8 @@ class Client:
     def close(self) -> None:
         """Closes the connection. A second call has no effect."""
         socket, self._socket = self._socket, None
-        if socket is not None:
+        # A fork leaves the connection to the process that made it.
+        if socket is not None and os.getpid() == self._process:
             # Without waiting for the answer of a server that simulates.
             socket.shutdown()
 

@@ -1,6 +1,6 @@
 """Several environments that one server steps at the same time, without worker processes."""
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -22,7 +22,8 @@ class SoftVTVectorEnv(VectorEnv):
         max_episode_steps: int | None = None,
         **arguments: Any,
     ):
-        """`arguments` are those of SoftVTEnv. `max_episode_steps` truncates episodes before the budget of their task."""
+        """`arguments` are those of SoftVTEnv. `max_episode_steps` truncates episodes after so many calls of `step`, before the budget of their
+        task."""
         num_envs = whole_number("num_envs", num_envs, 1)
         if max_episode_steps is not None:
             max_episode_steps = whole_number("max_episode_steps", max_episode_steps, 1)
@@ -51,14 +52,19 @@ class SoftVTVectorEnv(VectorEnv):
     def reset(self, *, seed: int | Sequence[int | None] | None = None, options: dict[str, Any] | None = None) -> tuple[Any, dict[str, Any]]:
         """Starts an episode in each environment, or in those of the mask `options["reset_mask"]`. A single seed is that of the first one, and
         the others have the following ones."""
-        seeds = (
-            [None if seed is None else seed + index for index in range(self.num_envs)] if seed is None or isinstance(seed, int) else seed
-        )
+        if seed is None:
+            seeds: Sequence[int | None] = [None] * self.num_envs
+        elif isinstance(seed, Sequence | np.ndarray):
+            seeds = list(seed)
+        else:
+            first = whole_number("seed", seed, 0)
+            seeds = [first + index for index in range(self.num_envs)]
         if len(seeds) != self.num_envs:
             raise ValueError(f"reset: {len(seeds)} seeds for {self.num_envs} environments")
+        if options is not None and not isinstance(options, Mapping):
+            raise ValueError(f"reset: options: expected a dict, got {options!r}")
         options = dict(options or {})
-        mask = np.asarray(options.pop("reset_mask", np.ones(self.num_envs, dtype=np.bool_)))
-        chosen = [int(index) for index in np.flatnonzero(mask)]
+        chosen = self._chosen(options.pop("reset_mask", None))
         self._begin_all(chosen, lambda index: self.envs[index].begin_reset(seeds[index], options), self._end_reset)
         infos: dict[str, Any] = {}
         for index, info in self._wait(chosen, self._end_reset).items():
@@ -126,6 +132,20 @@ class SoftVTVectorEnv(VectorEnv):
         """Closes all environments."""
         for env in self.envs:
             env.close()
+
+    def _chosen(self, reset_mask: Any) -> list[int]:
+        """The environments that a mask resets. Raises ValueError for anything else than a bool for each environment, and for a mask that leaves
+        an environment without its first episode."""
+        if reset_mask is None:
+            return list(range(self.num_envs))
+        mask = np.asarray(reset_mask)
+        if mask.dtype != np.bool_ or mask.shape != (self.num_envs,):
+            raise ValueError(f"reset: reset_mask={reset_mask!r}: expected {self.num_envs} bools, one for each environment")
+        if not mask.any():
+            raise ValueError("reset: reset_mask selects no environment")
+        if any(observation is None and not chosen for observation, chosen in zip(self._observations, mask, strict=True)):
+            raise ValueError("reset: reset_mask leaves out an environment that has had no episode; leave out the mask of the first reset")
+        return [int(index) for index in np.flatnonzero(mask)]
 
     def _begin_all(self, indices: Sequence[int], begin: Callable[[int], None], end: Callable[[int], dict[str, Any]]) -> None:
         """Sends a request for each of these environments. If one fails, the answers to those before are read, so that none is left for a later

@@ -200,5 +200,10 @@ class SoftVTBenchmark(StepBenchmark):
 
     def _environment(self) -> SoftVTEnv:
         if self._env is None:
-            self._env = SoftVTEnv(self.suite, task=None, **self._arguments)
+            env = SoftVTEnv(self.suite, task=None, **self._arguments)
+            names = [served["name"] for served in env.hello["suites"]]
+            if len(names) > 1:
+                env.close()
+                raise ValueError(f"suite={self.suite!r} has the suites {', '.join(names)}, and a benchmark has one: give one of them")
+            self._env = env
         return self._env

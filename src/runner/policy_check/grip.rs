@@ -86,6 +86,18 @@ pub(super) fn explain_grip(
             return Some(words(&own, &best, before));
         }
     }
+    let of_closed = || pairs.iter().filter(|pair| pair.recorded > middle).map(|pair| pair.answered);
+    if r >= AGREES
+        && values.is_some_and(|values| values.code == GripCode::Binary)
+        && median(of_closed()) <= 0.5
+    {
+        return Some(format!(
+            "gripper: the grip code is binary, which closes above the middle of open and closed, and the answers where the demonstrations \
+             are closed are closures of {:.2} in the median, so that the hand stays open: train on actions_binary, or choose --gripper \
+             continuous",
+            median(of_closed())
+        ));
+    }
     let answered = sorted(pairs.iter().map(|pair| pair.answered));
     let spread = answered[answered.len() * 19 / 20] - answered[answered.len() / 20];
     if r.abs() < AGREES && spread < STILL {

@@ -30,7 +30,7 @@ use self::{
     position::{PositionFinding, displacements, explain_position},
     rotation::{RotationFinding, explain_rotation, turns},
     sampling::StepSample,
-    timing::{TimingFinding, explain_timing, retimed},
+    timing::{TimingFinding, explain_order, explain_timing, retimed},
 };
 use crate::{
     error::RunError,
@@ -165,7 +165,14 @@ fn findings(
     translation: &AnswerAgreement,
     rotation: &AnswerAgreement,
 ) -> Vec<String> {
-    let mut findings = Vec::new();
+    let failure = |(k, demo): (usize, &DemoSamples)| {
+        let (failure, step) = (demo.failure.as_ref()?, demo.steps.len());
+        Some(format!("answers: demonstration {}, step {step}: {failure}", k + 1))
+    };
+    let mut findings: Vec<String> = demos.iter().enumerate().find_map(failure).into_iter().collect();
+    if steps.is_empty() {
+        return findings;
+    }
     let mut has_taken_grip = false;
     let timing = explain_timing(demos);
     let stretch = timing.as_ref().and_then(|timing| timing.stretch);
@@ -185,6 +192,7 @@ fn findings(
             }
         }
         None if are_joints(steps) => findings.extend(explain_joints(steps, translation)),
+        None if let Some(reversed) = explain_order(steps) => findings.push(reversed),
         None => {
             let position = explain_position(steps, translation);
             let is_other = position.as_ref().is_some_and(|found| found.is_other_encoding);

@@ -86,6 +86,8 @@ pub struct DemoSamples {
     pub(super) steps: Vec<StepSample>,
     pub(super) answers: Vec<AnswerSample>,
     pub(super) encoding: Option<ActionEncoding>,
+    /// The error that ended the comparison.
+    pub(super) failure: Option<String>,
 }
 
 /// A command of an answer that is not compared yet.
@@ -153,6 +155,14 @@ impl AnswerComparison {
     /// # Errors
     /// The policy fails.
     pub fn step(&mut self, observation: &Observation, recorded: RecordedStep) -> Result<(), PolicyError> {
+        let compared = self.compare(observation, recorded);
+        if let Err(error) = &compared {
+            lock(&self.samples).failure = Some(error.to_string());
+        }
+        compared
+    }
+
+    fn compare(&mut self, observation: &Observation, recorded: RecordedStep) -> Result<(), PolicyError> {
         if let Some(brief) = self.brief.take() {
             self.policy.reset(&brief)?;
         }

@@ -12,6 +12,8 @@ const RATES: [f64; 14] =
     [0.5, 2.0, 0.25, 4.0, 1.0 / 3.0, 3.0, 2.0 / 3.0, 4.0 / 3.0, 0.2, 5.0, 0.4, 6.0, 0.125, 8.0];
 /// Commands that an answer needs to tell its rate.
 const LEAST_COMMANDS: usize = 4;
+/// Mean error below which the order of an answer is not doubted, m.
+const LEAST_ERROR_M: f64 = 5e-3;
 /// Share of the recorded motion below which answers hold still.
 const STILL: f64 = 0.3;
 
@@ -97,6 +99,27 @@ impl RecordedPath {
         let start = if self.are_sums { self.at(answer.step as f64 - 1.0)? } else { answer.start };
         Some(self.at(answer.step as f64 + steps)? - start)
     }
+}
+
+/// Names answers whose last command comes first.
+pub(super) fn explain_order(steps: &[StepSample]) -> Option<String> {
+    let mut of_answer: Vec<&[StepSample]> = steps.chunk_by(|a, b| a.request_step == b.request_step).collect();
+    of_answer.retain(|answer| answer.len() >= LEAST_COMMANDS && !answer[0].is_step);
+    let distance = |recorded: &StepSample, answered: &StepSample| {
+        (recorded.recorded.action.position_b - answered.answered.position_b).norm()
+    };
+    let pairs = || of_answer.iter().flat_map(|answer| answer.iter().zip(*answer));
+    let reversed = || of_answer.iter().flat_map(|answer| answer.iter().zip(answer.iter().rev()));
+    let before = mean(pairs().map(|(recorded, answered)| distance(recorded, answered)));
+    let after = mean(reversed().map(|(recorded, answered)| distance(recorded, answered)));
+    (before > LEAST_ERROR_M && after <= CLEARLY_BETTER * before).then(|| {
+        format!(
+            "order: the answers look reversed in time (error {:.1} mm as received, {:.1} mm so read): the first action of an answer is \
+             that of the observation",
+            1e3 * before,
+            1e3 * after
+        )
+    })
 }
 
 fn pairs(demos: &[DemoSamples], least: usize, stretch: Stretch) -> Vec<VectorPair> {
