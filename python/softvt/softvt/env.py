@@ -378,6 +378,7 @@ class SoftVTEnv(gymnasium.Env[Observation, np.ndarray]):
         response = self._client.receive()
         before = self._verdict
         self._verdict = response["info"].get("verdict", {})
+        self._warn_of_missing_limits()
         observation, state = self._observe(response, is_first=False)
         info = self._info(response["info"], before)
         reward = self._reward_of(response, state)
@@ -426,7 +427,6 @@ class SoftVTEnv(gymnasium.Env[Observation, np.ndarray]):
             self._scene = _read_scene(raw)
         observation, state = self._observe(response, is_first=True)
         self._progress = progress(state, self._verdict) if state is not None else 0.0
-        self._warn_of_missing_limits()
         return observation, self._info(raw, None)
 
     def _warn_of_missing_limits(self) -> None:

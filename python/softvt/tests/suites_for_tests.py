@@ -47,6 +47,27 @@ return suite
 
 
 @cache
+def uncalibrated_suite() -> str:
+    """Path of a suite of one task, whose object has no limit."""
+    path = FOLDER / "uncalibrated.lua"
+    path.write_text("""
+local box = softvt.shape.box
+local floor = softvt.asset { name = "floor", shape = box { size = { 1, 1, 0.05 } }:translate(0, 0, -0.025), body = softvt.static {} }
+local material = softvt.soft { youngs_pa = 2e4, poisson = 0.3, density = 300, damage_strain = 0.2 }
+local cube = softvt.asset { name = "cube", shape = box { size = { 0.04, 0.04, 0.04 } }:grounded(), body = material }
+local layout = softvt.layout("cube", function(scene)
+  scene:add { name = "floor", asset = floor, position = { 0, 0, 0 } }
+  scene:add { name = "cube", asset = cube, at = { 0, 0.1 } }
+  scene:add { name = "post", asset = floor, position = { 0, 2, 0 } }
+end)
+return softvt.suite { name = "uncalibrated", object_type = "deformable", tasks_differ_in = "spatial", episodes = 1, tasks = {
+  softvt.task { prompt = "wait", layout = layout, goal = softvt.on { object = "cube", target = "post" }, budget_steps = 4 },
+} }
+""")
+    return str(path)
+
+
+@cache
 def crushing_suite() -> str:
     """Path of a suite of one task, whose goal moves a bun and a croissant, and whose expert crushes the croissant."""
     path = FOLDER / "crushing.lua"

@@ -1,5 +1,6 @@
 """Environments: Gymnasium's checker, observations, rewards, info, episodes and states."""
 
+import os
 import pickle
 import unittest
 import warnings
@@ -10,11 +11,12 @@ import softvt
 from gymnasium.utils.env_checker import check_env
 from softvt.env import CONTROL_DT
 from softvt.true_state import STATE_BOUNDS, STATE_FIELDS, TrueState, progress
-from suites_for_tests import STEPS, crushing_suite, drawer_suite, expert_run, same, short_suite
+from suites_for_tests import STEPS, crushing_suite, drawer_suite, expert_run, same, short_suite, uncalibrated_suite
 
 # Policies of this field return poses in metres and radians, and depth is infinite in the background.
 EXPECTED_WARNINGS = ("we recommend using a symmetric and normalized space", "is infinity", "is -infinity")
 HOLD = np.zeros(7)
+_COSTS = ("cost", "cost_deformation", "cost_drop", "cost_slip")
 
 
 def field(state: np.ndarray, name: str) -> np.ndarray:
@@ -389,10 +391,49 @@ class Environments(unittest.TestCase):
             end = env.step(HOLD)
         self.assertTrue(end[3])
         again = env.step(HOLD)
-        self.assertTrue(same(again[0], end[0]) and again[1:4] == (0.0, False, True) and again[4] is end[4])
+        self.assertTrue(same(again[0], end[0]) and again[1:4] == (0.0, False, True) and again[4].keys() == end[4].keys())
         self.assertTrue(same(env.reset()[0], end[0]), "as an autoreset calls it")
         self.assertEqual(env.reset(options={"lerobot_new_rollout": True})[1]["step"], 0)
         self.assertFalse(env.step(HOLD)[3])
+
+    def test_a_fork_does_not_use_the_connection_of_its_parent(self):
+        env = self.make(obs="proprio")
+        env.reset(seed=1000)
+        reader, writer = os.pipe()
+        child = os.fork()
+        if child == 0:
+            try:
+                env.step(HOLD)
+            except softvt.ServerError as error:
+                os.write(writer, str(error).encode())
+            env.close()
+            os._exit(0)
+        os.waitpid(child, 0)
+        self.assertIn(f"belongs to process {os.getpid()}", os.read(reader, 1000).decode())
+        os.close(reader)
+        os.close(writer)
+        self.assertEqual(env.step(HOLD)[4]["step"], 1)
+
+    def test_an_object_without_a_limit_is_a_warning(self):
+        env = self.make(uncalibrated_suite(), obs="proprio", reward="safety")
+        env.reset(seed=1000)
+        with self.assertWarnsRegex(UserWarning, "has no limit τ"):
+            env.step(HOLD)
+        judged = self.make(obs="proprio", reward="safety")
+        judged.reset(seed=1000)
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")
+            env.step(HOLD)
+            judged.step(HOLD)
+
+    def test_a_frozen_transition_costs_nothing(self):
+        env = self.make(crushing_suite(), obs="proprio", control="pose", freeze=True)
+        actions, _ = expert_run("expert", crushing_suite())
+        env.reset(seed=1000)
+        end = env.step(actions)
+        self.assertTrue((end[2] or end[3]) and end[4]["cost"] > 0, end[1:4])
+        again = env.step(actions)[4]
+        self.assertEqual({key: again[key] for key in again if key.startswith("cost")}, dict.fromkeys(_COSTS, 0.0))
 
     def test_after_the_end_a_step_is_refused(self):
         env = self.make(obs="proprio")
@@ -481,6 +522,20 @@ class Vectors(unittest.TestCase):
             envs.step(hold)
         envs.reset(seed=[5, 6], options={"reset_mask": np.array([True, False])})
         self.assertEqual(envs._ended.tolist(), [False, True])
+
+    def test_a_vector_refuses_masks_and_options_that_are_none(self):
+        envs = softvt.SoftVTVectorEnv(2, script=short_suite(), obs="proprio")
+        self.addCleanup(envs.close)
+        with self.assertRaisesRegex(ValueError, "has had no episode"):
+            envs.reset(options={"reset_mask": np.array([True, False])})
+        self.assertEqual(envs.reset(seed=np.int64(1000))[1]["episode_index"].tolist(), [0, 1])
+        for mask in (np.array([0, 1]), [1], np.array([True]), np.array([True] * 3), "all"):
+            with self.assertRaisesRegex(ValueError, "expected 2 bools"):
+                envs.reset(options={"reset_mask": mask})
+        with self.assertRaisesRegex(ValueError, "selects no environment"):
+            envs.reset(options={"reset_mask": np.zeros(2, dtype=bool)})
+        with self.assertRaisesRegex(ValueError, "expected a dict"):
+            envs.reset(options=[1])
 
     def test_an_action_that_is_refused_leaves_the_other_environments_as_they_are(self):
         envs = softvt.SoftVTVectorEnv(2, script=short_suite(), obs="proprio")

@@ -79,6 +79,10 @@ class Benchmarks(unittest.TestCase):
         self.assertEqual((result["mean_success"], result["mean_safety"], result["mean_no_drop"]), (1.0, 0.0, 1.0))
         self.assertAlmostEqual(result["max_d_over_tau"], record["d_peak"] / record["tau"], places=3)
 
+    def test_a_benchmark_of_several_suites_is_refused(self):
+        with self.assertRaisesRegex(ValueError, "has the suites object_soft, .*give one of them"):
+            SoftVTBenchmark("all").get_tasks()
+
     def test_formats_and_held_actions_follow_the_control(self):
         pose = SoftVTBenchmark(short_suite(), image_size=48)
         delta = SoftVTBenchmark(
