@@ -65,7 +65,7 @@ class Dataset:
         *,
         horizon: int = 1,
         control: str = "pose",
-        gripper: str = "continuous",
+        gripper: str | None = None,
         task: int | Sequence[int] | None = None,
     ):
         """Opens a recording.
@@ -75,23 +75,26 @@ class Dataset:
             as "privileged/d".
         horizon: number of actions of an item.
         control: motion of the actions, "pose" or "joints".
-        gripper: grip code of the actions.
+        gripper: grip code of the actions; by default that of the recording, as of its exports.
         task: only these tasks.
 
         Raises ValueError if there is no such stream, or no demonstration of one of the tasks, and ImportError without h5py.
         """
-        require_one_of("gripper", gripper, [*ACTIONS])
+        if gripper is not None:
+            require_one_of("gripper", gripper, [*ACTIONS])
         require_one_of("control", control, ("pose", "joints"))
         horizon = whole_number("horizon", horizon, 1)
         keys = texts("keys", keys)
         if not isinstance(path, str | os.PathLike):
             raise ValueError(f"path={path!r}: expected the path of a recording")
         self._streams = {key: key if "/" in key else f"obs/{key}" for key in keys}
-        self._actions, self._horizon, self._control = ACTIONS[gripper], horizon, control
+        self._horizon, self._control = horizon, control
         self._files: dict[Path, h5py.File] = {}
         self._process = os.getpid()
         tasks = None if task is None else _tasks(task)
-        recorded = [demo for file in _hdf5_files(Path(path)) for demo in self._read(file)]
+        files = _hdf5_files(Path(path))
+        self._actions = ACTIONS[gripper or _recorded_gripper(files[0])]
+        recorded = [demo for file in files for demo in self._read(file)]
         if not recorded:
             raise ValueError(f"{path}: no demonstration")
         known = {demo.task for demo in recorded}
@@ -208,6 +211,17 @@ def _hdf5_files(path: Path) -> list[Path]:
     if not found:
         raise ValueError(f"{path}: no recording; give a folder that softvt record wrote, or one of its HDF5 files")
     return found
+
+
+def _recorded_gripper(file: Path) -> str:
+    """The grip code of the recording that an HDF5 file belongs to."""
+    for folder in file.resolve().parents[:2]:
+        card = folder / "dataset.json"
+        if card.is_file():
+            gripper = json.loads(card.read_text(encoding="utf-8")).get("gripper") or "continuous"
+            require_one_of(f"{card}: gripper", gripper, [*ACTIONS])
+            return str(gripper)
+    return "continuous"
 
 
 def _manifest_files(manifest: Path) -> set[str]:

@@ -51,6 +51,8 @@ _MAX_IMAGE_EDGE = 4096  # pixels
 # What the server tells in `info` and the environment passes on under another name, or not at all.
 _OTHER_NUMBERS = ("task", "episode", "step", "carried_out")
 _SENSOR_EDGE = 240  # pixels of each image of the render mode "sensors"
+# Key of `get_state` for the last true states, which the server does not keep.
+_PAST_STATES = "past_true_states"
 # Servers, suites and tasks whose goals were checked, so that a vector does it once.
 _with_true_state: set[tuple[str, str, int]] = set()
 
@@ -392,13 +394,17 @@ class SoftVTEnv(gymnasium.Env[Observation, np.ndarray]):
     def get_state(self) -> dict[str, Any]:
         """State of the episode as plain data, for `set_state` of this or an equal environment."""
         state: dict[str, Any] = self._ask("get_state")["state"]
+        if self._history > 1 and self._needs_state():
+            state[_PAST_STATES] = [past.tolist() for past in self._past]
         return state
 
     def set_state(self, state: dict[str, Any]) -> tuple[Observation, dict[str, Any]]:
         """Restores a state bit for bit; returns what `reset` does."""
         if self._client.is_interrupted and self._closer.alive:
             self._reconnect()
-        return self._restart(self._client.request("set_state", state=state))
+        restored = dict(state) if isinstance(state, Mapping) else state
+        past = restored.pop(_PAST_STATES, None) if isinstance(restored, dict) else None
+        return self._restart(self._client.request("set_state", state=restored), past)
 
     def camera_matrices(self) -> dict[str, dict[str, Any]]:
         """Of each camera by name, in the present state: `width` and `height` of its image, pixels, its matrix `intrinsic` (3, 3), and its pose in
@@ -415,8 +421,8 @@ class SoftVTEnv(gymnasium.Env[Observation, np.ndarray]):
         pending, self._pending = self._pending, ""
         return pending
 
-    def _restart(self, response: dict[str, Any]) -> tuple[Observation, dict[str, Any]]:
-        """Takes in the first answer of an episode or of a restored state."""
+    def _restart(self, response: dict[str, Any], past: Sequence[Sequence[float]] | None = None) -> tuple[Observation, dict[str, Any]]:
+        """Takes in the first answer of an episode, or of a restored state with the true states up to it."""
         raw = response["info"]
         self._last, self._has_probe = None, False
         self.task = raw["task"]
@@ -425,7 +431,7 @@ class SoftVTEnv(gymnasium.Env[Observation, np.ndarray]):
         self._scene = None
         if self._needs_state():
             self._scene = _read_scene(raw)
-        observation, state = self._observe(response, is_first=True)
+        observation, state = self._observe(response, is_first=True, past=past)
         self._progress = progress(state, self._verdict) if state is not None else 0.0
         return observation, self._info(raw, None)
 
@@ -503,12 +509,16 @@ class SoftVTEnv(gymnasium.Env[Observation, np.ndarray]):
     def _is_true_state(self, key: str) -> bool:
         return key == "state" and key not in self._entries
 
-    def _observe(self, response: dict[str, Any], is_first: bool) -> tuple[Observation, TrueState | None]:
+    def _observe(
+        self, response: dict[str, Any], is_first: bool, past: Sequence[Sequence[float]] | None = None
+    ) -> tuple[Observation, TrueState | None]:
         sent, raw = response["observation"], response["info"]
         flat = {key: sent[key] for key in self._entries}
         state = None if self._scene is None else TrueState.read(self._scene, raw["state"], raw["verdict"])
         if state is not None and self._parts is not None and "state" in self._parts:
             self._past.extend([state.vector] * (self._history if is_first else 1))
+            if past is not None:
+                self._past.extend(np.asarray(vector, dtype=state.vector.dtype) for vector in past)
             flat["state"] = state.vector if self._history == 1 else np.stack(self._past)
         if self._layout == "flat":
             return (next(iter(flat.values())) if self._is_bare else flat), state

@@ -371,6 +371,19 @@ class Environments(unittest.TestCase):
         after, *_ = env.step(HOLD + 0.5)
         self.assertTrue(same(after[:2], start[1:]) and not same(after[2], start[2]))
 
+    def test_a_restored_state_has_the_history_of_the_true_state(self):
+        env = self.make(obs="state+proprio", history=3)
+        env.reset(seed=1000)
+        for _ in range(4):
+            before = env.step(HOLD + 0.2)[0]
+        state = env.get_state()
+        env.step(HOLD)
+        self.assertTrue(same(env.set_state(state)[0], before))
+        self.assertTrue(same(self.make(obs="state+proprio", history=3).set_state(state)[0], before))
+        self.assertTrue(
+            same(env.set_state({key: state[key] for key in state if key != "past_true_states"})[0]["proprio"], before["proprio"])
+        )
+
     def test_render_modes_and_their_images(self):
         for mode, camera, shape in [
             ("rgb_array", None, (224, 224, 3)),

@@ -93,6 +93,22 @@ class Datasets(unittest.TestCase):
         self.assertEqual(set(np.unique([item["actions"][0, 6] for item in data])), {0.0, 1.0})
         self.assertIn("privileged/pad_force", data[0])
 
+    def test_the_grip_code_is_that_of_the_recording_by_default(self):
+        folder = FOLDER / "forces"
+        shutil.copytree(self.folder, folder)
+        card = json.loads((folder / "dataset.json").read_text())
+        (folder / "dataset.json").write_text(json.dumps(card | {"gripper": "force"}))
+
+        def grips(path, **arguments):
+            return np.array([item["actions"][0, 6] for item in softvt.Dataset(path, keys=("state",), **arguments)])
+
+        forces = grips(self.folder, gripper="force")
+        for path in (folder, min((folder / "hdf5").iterdir())):
+            found = grips(path)
+            np.testing.assert_array_equal(found, forces[: len(found)])
+        np.testing.assert_array_equal(grips(self.folder), grips(folder, gripper="continuous"))
+        self.assertFalse(np.array_equal(grips(self.folder), forces))
+
     def test_a_data_set_can_be_sent_to_a_worker(self):
         data = softvt.Dataset(self.folder)
         self.assertEqual(pickle.loads(pickle.dumps(data))[3]["step"], data[3]["step"])
