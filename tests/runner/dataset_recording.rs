@@ -223,6 +223,16 @@ fn datasets_are_checked_and_reproduced() {
         "{problems:?}"
     );
     fs::remove_file(stray).expect("removed");
+    let manifest = project.text("a/manifest.jsonl");
+    project
+        .write("a/manifest.jsonl", manifest.replacen("\"language\":\"", "\"language\":\"now ", 1).as_bytes());
+    let problems = check::folder(&a, check::CheckScope::Whole).expect("a dataset").problems;
+    assert!(
+        matches!(&problems[..], [one] if one.contains("/data/demo_0, attribute language: ")
+            && one.contains("the manifest says \"now ")),
+        "{problems:?}"
+    );
+    project.write("a/manifest.jsonl", manifest.as_bytes());
     project.write("a/videos/one_task0/demo_0_eye_in_hand_rgb.mp4", b"not a video");
     let whole = fs::read(&hdf5).expect("read");
     fs::write(&hdf5, &whole[..whole.len() / 2]).expect("written");

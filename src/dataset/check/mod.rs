@@ -13,6 +13,7 @@ use super::{
     DatasetError, StreamValues, TaskFile,
     card::DatasetCard,
     demonstration::{CAMERA_POSES, JOINT_ACTIONS, JOINT_TORQUES, actions_stream_name},
+    grip_labels::OPEN_FORCE,
     layout::{DEPTH_STREAMS, IMAGE_STREAMS, MANIFEST, is_image_stream},
     manifest::{self, ManifestEntry},
 };
@@ -129,16 +130,36 @@ pub fn folder(root: &Path, scope: CheckScope) -> Result<CheckReport, DatasetErro
             report.add(&path, "/data", what);
         }
         for entry in entries {
-            if let Some(steps) = report.take(file.steps(entry.demo_id))
-                && steps != entry.num_samples
-            {
-                let what = format!("{steps} steps, the manifest says {}", entry.num_samples);
-                report.add(&path, &format!("/data/demo_{}", entry.demo_id), what);
-            }
+            check_entry(&mut report, &file, entry);
         }
         check_demonstrations(&mut report, &file, scope);
     }
     Ok(report)
+}
+
+/// Checks that a demonstration is the one that its line of the manifest describes.
+fn check_entry(report: &mut CheckReport, file: &TaskFile, entry: &ManifestEntry) {
+    let demo = entry.demo_id;
+    let Some(steps) = report.take(file.steps(demo)) else { return };
+    let key = format!("/data/demo_{demo}");
+    if steps != entry.num_samples {
+        let what = format!("{steps} steps, the manifest says {}", entry.num_samples);
+        report.add(&file.path, &key, what);
+    }
+    let attributes = [
+        ("task_suite", &entry.task_suite),
+        ("language", &entry.language),
+        ("asset_name", &entry.asset_name),
+        ("state_hash", &entry.state_hash),
+    ];
+    for (name, expected) in attributes {
+        if let Some(found) = report.take(file.text(demo, name))
+            && found != *expected
+        {
+            let what = format!("{found:?}, the manifest says {expected:?}");
+            report.add(&file.path, &format!("{key}, attribute {name}"), what);
+        }
+    }
 }
 
 /// HDF5 files beside those that the manifest names.
@@ -372,7 +393,8 @@ impl DemoCheck<'_> {
         }
         let rows = labels.chunks_exact(7).zip(actions.chunks_exact(7)).zip(binary.chunks_exact(7));
         let is_label = |label: f64, is_closed: bool| match code {
-            GripCode::Force => (label >= 0.0) == is_closed && label.is_finite(),
+            GripCode::Force if is_closed => label >= 0.0 && label.is_finite(),
+            GripCode::Force => label == OPEN_FORCE,
             _ => (0.0..=1.0).contains(&label) && (is_closed || label == 0.0),
         };
         let mut bad =

@@ -169,6 +169,15 @@ fn readings_in_other_units_or_without_content_are_reported() {
 }
 
 #[test]
+fn forces_of_an_open_hand_have_the_value_of_their_code() {
+    let mut scaled = demonstration(0.0);
+    scaled.grip_labels_n.iter_mut().for_each(|label| *label *= 10.0);
+    let (_folder, path) = write(&scaled, "task.hdf5");
+    let found = file(&path).unwrap().problems;
+    assert!(found[0].contains("actions_force: step 0: not the actions in the grip code force"), "{found:?}");
+}
+
+#[test]
 fn true_states_that_contradict_each_other_are_reported() {
     let mut wrong = demonstration(0.0);
     wrong.privileged.push(DataStream::f64("privileged/pad_force", &[2], vec![0.0; 2 * STEPS]));
