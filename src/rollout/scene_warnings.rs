@@ -29,12 +29,13 @@ pub fn scene_warnings(task: &Task, scene: &Scene, cache: &AssetCache) -> BTreeSe
             .map(move |warning| format!("asset {name}: {warning}"))
     };
     let mut all: BTreeSet<String> = scene.objects.iter().flat_map(|object| warnings(&object.asset)).collect();
-    let targets = task.targets();
-    let targets = scene.objects.iter().filter(|object| targets.contains(&object.name.as_str()));
-    all.extend(targets.clone().filter_map(|target| width_warning(&target.asset)));
-    let goals = task.goal.predicates();
+    let (targets, goals) = (task.targets(), task.goal.predicates());
+    let is_target = |object: &&Object| targets.contains(&object.name.as_str());
     let is_place = |object: &&Object| goals.iter().any(|goal| goal.target() == Some(&object.name));
-    let named: Vec<&Object> = targets.chain(scene.objects.iter().filter(is_place)).collect();
+    all.extend(scene.objects.iter().filter(is_target).filter_map(|target| width_warning(&target.asset)));
+    // An object of a stack is both.
+    let named: Vec<&Object> =
+        scene.objects.iter().filter(|object| is_target(object) || is_place(object)).collect();
     all.extend(named.iter().filter_map(|object| workspace_warning(scene, object, cache)));
     all.extend(scene.cameras.iter().filter_map(|camera| view_warning(camera, &named, cache)));
     all.extend(budget_warning(task));

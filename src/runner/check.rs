@@ -75,7 +75,7 @@ struct SceneFindings {
     warnings: BTreeSet<String>,
     /// Names of the soft assets whose material has no strain limit.
     without_strain: BTreeSet<String>,
-    /// Where each layout places its objects, without shifts.
+    /// Positions of the objects in the scene of each layout, without shifts, m.
     layouts: BTreeMap<LayoutOfTask, BTreeMap<String, Vec3>>,
     /// True if shifts change a scene or a prompt.
     has_changed: bool,

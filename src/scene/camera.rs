@@ -119,7 +119,7 @@ impl Camera {
         [[focal, 0.0, 0.5 * self.width as f64], [0.0, focal, 0.5 * self.height as f64], [0.0, 0.0, 1.0]]
     }
 
-    /// Whether a ball may be in the image, given its centre in the frame of the camera, m, and its radius, m.
+    /// True if a ball may be in the image, given its centre in the frame of the camera and its radius, m.
     pub fn can_show(&self, centre_c: &Vec3, radius: f64) -> bool {
         let depth = -centre_c.z;
         let half_height = (0.5 * self.fovy_rad).tan();

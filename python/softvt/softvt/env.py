@@ -213,8 +213,10 @@ class SoftVTEnv(gymnasium.Env[Observation, np.ndarray]):
         closer.atexit = False
         return closer
 
-    def _reconnect(self) -> None:
+    def _reconnect_if_interrupted(self) -> None:
         """Replaces a connection in which a request was interrupted."""
+        if not (self._client.is_interrupted and self._closer.alive):
+            return
         self._client.close()
         deadline = time.monotonic() + RECONNECT_S
         while True:
@@ -342,8 +344,7 @@ class SoftVTEnv(gymnasium.Env[Observation, np.ndarray]):
         named = options.get("episode")
         if seed is not None and named is not None and named != episode:
             raise ValueError(f"reset: seed={seed} is episode {episode}, and options name episode {named}; leave out one of them")
-        if self._client.is_interrupted and self._closer.alive:
-            self._reconnect()
+        self._reconnect_if_interrupted()
         requested = {"suite": self._suite, "task": task, "episode": episode, "split": self._split, **options}
         self._last = None
         self._client.send("reset", **{key: value for key, value in requested.items() if value is not None})
@@ -400,8 +401,7 @@ class SoftVTEnv(gymnasium.Env[Observation, np.ndarray]):
 
     def set_state(self, state: dict[str, Any]) -> tuple[Observation, dict[str, Any]]:
         """Restores a state bit for bit; returns what `reset` does."""
-        if self._client.is_interrupted and self._closer.alive:
-            self._reconnect()
+        self._reconnect_if_interrupted()
         restored = dict(state) if isinstance(state, Mapping) else state
         past = restored.pop(_PAST_STATES, None) if isinstance(restored, dict) else None
         return self._restart(self._client.request("set_state", state=restored), past)

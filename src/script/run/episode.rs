@@ -86,8 +86,8 @@ impl EpisodeSetup {
         SceneBuilder::open(loaded)?.build(id, changes)
     }
 
-    /// Whether the shifts change the scene or the prompt, beyond the rounding of camera poses and the lines that set
-    /// something.
+    /// True if the shifts change the scene or the prompt. Rounding of camera poses does not count, nor do source
+    /// locations.
     pub fn is_shifted(&self) -> bool {
         let mut scene = self.scene.clone();
         for (camera, nominal) in scene.cameras.iter_mut().zip(&self.nominal.cameras) {
