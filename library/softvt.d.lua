@@ -802,6 +802,7 @@
 ---@class softvt.Shape
 local Shape = {}
 
+---@nodiscard
 ---Moves the shape by an offset, m.
 ---@param x number
 ---@param y number
@@ -809,6 +810,7 @@ local Shape = {}
 ---@return softvt.Shape
 function Shape:translate(x, y, z) end
 
+---@nodiscard
 ---Stretches the shape by factors along x, y and z; a single factor holds for all axes.
 ---@param x number
 ---@param y? number
@@ -816,32 +818,38 @@ function Shape:translate(x, y, z) end
 ---@return softvt.Shape
 function Shape:scale(x, y, z) end
 
+---@nodiscard
 ---Grows the shape by a radius (m), which rounds convex edges.
 ---@param radius number
 ---@return softvt.Shape
 function Shape:round(radius) end
 
+---@nodiscard
 ---Keeps the wall of this thickness (m) below the surface.
 ---@param wall number
 ---@return softvt.Shape
 function Shape:shell(wall) end
 
+---@nodiscard
 ---Joins two shapes.
 ---@param other softvt.Shape
 ---@return softvt.Shape
 function Shape:union(other) end
 
+---@nodiscard
 ---Keeps the part that lies in both shapes.
 ---@param other softvt.Shape
 ---@return softvt.Shape
 function Shape:intersect(other) end
 
+---@nodiscard
 ---Cuts another shape out of this one; blend (m) rounds the edge.
 ---@param cut softvt.Shape
 ---@param blend? number
 ---@return softvt.Shape
 function Shape:subtract(cut, blend) end
 
+---@nodiscard
 ---Joins two shapes with a fillet of width blend (m).
 ---@param other softvt.Shape
 ---@param blend number
@@ -857,35 +865,42 @@ function Shape:bounds() end
 ---@return number
 function Shape:volume() end
 
+---@nodiscard
 ---Moves the shape so that its lowest point is at z = 0 and its centre on the z axis, as assets require.
 ---@return softvt.Shape
 function Shape:grounded() end
 
+---@nodiscard
 ---Rotates the shape about an axis through the origin.
 ---@param spec softvt.RotateSpec
 ---@return softvt.Shape
 function Shape:rotate(spec) end
 
+---@nodiscard
 ---Twists the shape about an axis through the origin.
 ---@param spec softvt.TwistSpec
 ---@return softvt.Shape
 function Shape:twist(spec) end
 
+---@nodiscard
 ---Bends the shape into an arc; the origin stays in place.
 ---@param spec softvt.BendSpec
 ---@return softvt.Shape
 function Shape:bend(spec) end
 
+---@nodiscard
 ---Adds regular ridges to a shape: rings, flutes, screws or spirals.
 ---@param spec softvt.RidgesSpec
 ---@return softvt.Shape
 function Shape:ridges(spec) end
 
+---@nodiscard
 ---Adds scattered bumps to a shape (seeds, raisins).
 ---@param spec softvt.BumpsSpec
 ---@return softvt.Shape
 function Shape:bumps(spec) end
 
+---@nodiscard
 ---Gives all or part of the surface another material.
 ---@param spec softvt.PaintSpec
 ---@return softvt.Shape
@@ -895,11 +910,13 @@ function Shape:paint(spec) end
 ---@class softvt.Mask
 local Mask = {}
 
+---@nodiscard
 ---Returns the product of two masks: 1 where both are.
 ---@param other softvt.Mask
 ---@return softvt.Mask
 function Mask:intersect(other) end
 
+---@nodiscard
 ---Returns 1 minus the mask.
 ---@return softvt.Mask
 function Mask:inverted() end
@@ -1193,11 +1210,13 @@ function Image:mean(region) end
 ---@return number[]
 function Image:pixel(x, y) end
 
+---@nodiscard
 ---Returns a region as an image of its own.
 ---@param region number[]
 ---@return softvt.Image
 function Image:crop(region) end
 
+---@nodiscard
 ---Returns the image in another size.
 ---@param width integer
 ---@param height integer
@@ -1224,21 +1243,25 @@ function Image:text(text, style) end
 ---@field quaternion number[] Orientation as quaternion w, x, y, z with w ≥ 0.
 local Pose = {}
 
+---@nodiscard
 ---Returns the pose moved by an offset in the world frame, m.
 ---@param offset number[]
 ---@return softvt.Pose
 function Pose:translated(offset) end
 
+---@nodiscard
 ---Returns the same orientation at another position, m.
 ---@param position number[]
 ---@return softvt.Pose
 function Pose:at(position) end
 
+---@nodiscard
 ---Returns the same position, rotated by an angle about the world's vertical, rad.
 ---@param angle number
 ---@return softvt.Pose
 function Pose:rotated(angle) end
 
+---@nodiscard
 ---Returns a pose between this one (at a share of 0) and another (at 1).
 ---@param other softvt.Pose
 ---@param share number
@@ -1260,6 +1283,7 @@ function Pose:distance(other) end
 ---@class softvt.Rng
 local Rng = {}
 
+---@nodiscard
 ---Returns another stream, from its start. Draws from one stream do not change those from another.
 ---@param name "layout"|"arm"|"material"|"size"|"colour"|"light"|"camera"|"sensor"|"expert"|"script"|"policy"
 ---@return softvt.Rng
@@ -1906,46 +1930,55 @@ function softvt.sorted(t) end
 ---Shapes, in metres.
 softvt.shape = {}
 
+---@nodiscard
 ---A box centred on the origin.
 ---@param spec softvt.BoxSpec
 ---@return softvt.Shape
 function softvt.shape.box(spec) end
 
+---@nodiscard
 ---A sphere centred on the origin.
 ---@param spec softvt.SphereSpec
 ---@return softvt.Shape
 function softvt.shape.sphere(spec) end
 
+---@nodiscard
 ---An ellipsoid centred on the origin.
 ---@param spec softvt.EllipsoidSpec
 ---@return softvt.Shape
 function softvt.shape.ellipsoid(spec) end
 
+---@nodiscard
 ---A capsule along the z axis, centred on the origin.
 ---@param spec softvt.CapsuleSpec
 ---@return softvt.Shape
 function softvt.shape.capsule(spec) end
 
+---@nodiscard
 ---A cylinder along the z axis, centred on the origin.
 ---@param spec softvt.CylinderSpec
 ---@return softvt.Shape
 function softvt.shape.cylinder(spec) end
 
+---@nodiscard
 ---A torus about the z axis, centred on the origin.
 ---@param spec softvt.TorusSpec
 ---@return softvt.Shape
 function softvt.shape.torus(spec) end
 
+---@nodiscard
 ---A triangular prism along y in a box centred on the origin.
 ---@param spec softvt.WedgeSpec
 ---@return softvt.Shape
 function softvt.shape.wedge(spec) end
 
+---@nodiscard
 ---A polygon in (x, z), extruded along y and centred on y = 0.
 ---@param spec softvt.PrismSpec
 ---@return softvt.Shape
 function softvt.shape.prism(spec) end
 
+---@nodiscard
 ---A profile revolved about the z axis.
 ---@param spec softvt.LatheSpec
 ---@return softvt.Shape
@@ -1954,61 +1987,73 @@ function softvt.shape.lathe(spec) end
 ---Masks: weights of the layers of a visual.
 softvt.mask = {}
 
+---@nodiscard
 ---Cubes, every other one 1; one corner is at the origin.
 ---@param spec softvt.CheckerMask
 ---@return softvt.Mask
 function softvt.mask.checker(spec) end
 
+---@nodiscard
 ---Slabs across an axis.
 ---@param spec softvt.StripesMask
 ---@return softvt.Mask
 function softvt.mask.stripes(spec) end
 
+---@nodiscard
 ---Rises smoothly from 0 to 1 along an axis.
 ---@param spec softvt.GradientMask
 ---@return softvt.Mask
 function softvt.mask.gradient(spec) end
 
+---@nodiscard
 ---Cloudy noise with values around 0.5, few below 0.2 or above 0.8.
 ---@param spec softvt.NoiseMask
 ---@return softvt.Mask
 function softvt.mask.noise(spec) end
 
+---@nodiscard
 ---Annual rings of a trunk: cylinders about a line along z, distorted by noise.
 ---@param spec softvt.RingsMask
 ---@return softvt.Mask
 function softvt.mask.rings(spec) end
 
+---@nodiscard
 ---Boards along x, side by side in y, with one value per board.
 ---@param spec softvt.BoardsMask
 ---@return softvt.Mask
 function softvt.mask.boards(spec) end
 
+---@nodiscard
 ---The gaps between boards of these sizes.
 ---@param spec softvt.SeamsMask
 ---@return softvt.Mask
 function softvt.mask.seams(spec) end
 
+---@nodiscard
 ---Scattered round specks.
 ---@param spec softvt.SpecksMask
 ---@return softvt.Mask
 function softvt.mask.specks(spec) end
 
+---@nodiscard
 ---A plain weave in x and y: high in the middle of a thread.
 ---@param spec softvt.WeaveMask
 ---@return softvt.Mask
 function softvt.mask.weave(spec) end
 
+---@nodiscard
 ---Surfaces that face a direction, by the cosine between their normal and that direction.
 ---@param spec? softvt.FacingMask
 ---@return softvt.Mask
 function softvt.mask.facing(spec) end
 
+---@nodiscard
 ---The inside of a shape: a painted rim, the grooves between ridges.
 ---@param spec softvt.InsideMask
 ---@return softvt.Mask
 function softvt.mask.inside(spec) end
 
+---@nodiscard
 ---The letters of a line of text, printed on surfaces that face the reader. Surfaces with text are drawn in finer detail.
 ---@param spec softvt.TextMask
 ---@return softvt.Mask

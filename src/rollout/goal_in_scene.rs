@@ -14,7 +14,7 @@ use softvt_benchmark::{
 };
 use softvt_evaluation::{
     goal::GoalRegion,
-    goal_tree::GoalNode,
+    goal_tree::{GoalMonitor, GoalNode},
     judge::{Predicate, PredicateRule},
 };
 use softvt_geometry::{Aabb, Vec3};
@@ -183,6 +183,12 @@ impl GoalInScene {
         })
     }
 
+    /// Which predicates are known to hold in a scene that need not have settled: not those of objects at rest.
+    fn known_to_hold(&self, sim: &Simulation) -> Vec<bool> {
+        let holds = |number| self.holds(number, sim, 0.0, |_| false).unwrap_or(false);
+        (0..self.predicates.len()).map(holds).collect()
+    }
+
     /// True if the goal may hold once the scene has settled. A conjunction may if each object is over its region, at
     /// any height, and the other predicates hold already.
     fn may_hold(&self, sim: &Simulation) -> bool {
@@ -314,7 +320,16 @@ fn is_conjunction(goal: &GoalNode) -> bool {
     }
 }
 
-/// Checks the goal of a task in a scene that need not have settled. Returns true if the goal may hold once it has.
+/// What is known of a goal before its scene has settled.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct GoalAtStart {
+    /// True if the goal may hold once the scene has settled.
+    pub may_hold: bool,
+    /// The first step of a sequence, if it holds already.
+    pub held_step: Option<String>,
+}
+
+/// Checks the goal of a task in a scene that need not have settled.
 ///
 /// # Errors
 /// The goal names an unknown object, a container without a cavity or something without a joint, or gravity does not
@@ -324,8 +339,27 @@ pub fn check_goal(
     sim: &Simulation,
     cache: &AssetCache,
     functions: &[Arc<dyn StatePredicate>],
-) -> Result<bool, EpisodeError> {
-    Ok(GoalInScene::find(task, sim, cache, functions)?.may_hold(sim))
+) -> Result<GoalAtStart, EpisodeError> {
+    let goal = GoalInScene::find(task, sim, cache, functions)?;
+    let step = first_step_held(&task.goal, &goal.goal, &goal.known_to_hold(sim));
+    Ok(GoalAtStart { may_hold: goal.may_hold(sim), held_step: step.map(Goal::describe) })
+}
+
+/// The first step of a sequence that nothing comes before, if it holds at the start; `holds` says which predicates do.
+fn first_step_held<'a>(goal: &'a Goal, node: &GoalNode, holds: &[bool]) -> Option<&'a Goal> {
+    match (goal, node) {
+        (Goal::Sequence(goals), GoalNode::Sequence(nodes)) => {
+            let (first, node) = (goals.goals.first()?, nodes.first()?);
+            match nodes.len() > 1 && GoalMonitor::new(node.clone()).update(holds) {
+                true => Some(first),
+                false => first_step_held(first, node, holds),
+            }
+        }
+        (Goal::All(goals), GoalNode::All(nodes)) | (Goal::Any(goals), GoalNode::Any(nodes)) => {
+            goals.goals.iter().zip(nodes).find_map(|(goal, node)| first_step_held(goal, node, holds))
+        }
+        _ => None,
+    }
 }
 
 /// Region in which an object must rest, in the frame of the object that carries it at its foot. `None` for the inside

@@ -97,7 +97,7 @@ pub use build_error::SceneBuildError;
 pub use controller::{ChunkedPolicy, Controller};
 pub use episode::{Episode, EpisodeSpec, FinishedEpisode, checksum, target_asset};
 pub use episode_error::EpisodeError;
-pub use goal_in_scene::{StatePredicate, check_goal};
+pub use goal_in_scene::{GoalAtStart, StatePredicate, check_goal};
 pub use metric::{MeasuredMetric, StateFunction};
 pub use robot_instance::{ArmCommand, RobotInstance};
 pub use scene_warnings::scene_warnings;

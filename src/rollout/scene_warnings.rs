@@ -8,8 +8,8 @@ use softvt_common::text::{format_number, is_misspelt};
 use softvt_geometry::pieces::SeparatePieces;
 use softvt_robot::gripper::MAX_WIDTH;
 use softvt_scene::{
-    Asset, Body, Camera, CameraMount, EXPERT_HINTS, GRASP_HEIGHT_HINT, GRASP_WIDTH_HINT, Object, Scene,
-    SoftMaterial,
+    Asset, Body, CARRY_PACE_HINT, Camera, CameraMount, EXPERT_HINTS, GRASP_HEIGHT_HINT, GRASP_WIDTH_HINT,
+    Object, Scene, SoftMaterial,
 };
 
 /// Warnings about a scene of a task, one line each: materials, soft bodies of few voxels, bodies of several pieces or
@@ -25,7 +25,7 @@ pub fn scene_warnings(task: &Task, scene: &Scene, cache: &AssetCache) -> BTreeSe
             .chain(pieces_warning(asset, cache))
             .chain(origin_warning(asset, cache))
             .chain(hint_warnings(asset))
-            .chain(grasp_warning(asset, cache))
+            .chain(hint_value_warning(asset, cache))
             .map(move |warning| format!("asset {name}: {warning}"))
     };
     let mut all: BTreeSet<String> = scene.objects.iter().flat_map(|object| warnings(&object.asset)).collect();
@@ -176,21 +176,73 @@ fn width_warning(asset: &Asset) -> Option<String> {
     })
 }
 
-/// A warning about a grasp that does not meet the object.
-fn grasp_warning(asset: &Asset, cache: &AssetCache) -> Option<String> {
+/// A warning about a hint that does not fit the object.
+fn hint_value_warning(asset: &Asset, cache: &AssetCache) -> Option<String> {
+    if let Some(pace) = asset.hints.get(CARRY_PACE_HINT).filter(|pace| !(**pace > 0.0 && **pace <= 1.0)) {
+        return Some(format!(
+            "hints.{CARRY_PACE_HINT} is {}; expected a number above 0, at most 1",
+            format_number(*pace)
+        ));
+    }
     let size = cache.bounds(&asset.shape).size();
     let mm = |metres: f64| format_number((1e4 * metres).round() / 10.0);
-    let height = asset.hints.get(GRASP_HEIGHT_HINT).filter(|height| !(0.0..=size.z).contains(*height));
-    let width = asset.hints.get(GRASP_WIDTH_HINT).filter(|width| !(0.0..=size.xy().norm()).contains(*width));
-    let (name, value) =
-        height.map(|height| (GRASP_HEIGHT_HINT, height)).or(width.map(|width| (GRASP_WIDTH_HINT, width)))?;
-    Some(format!(
-        "hints.{name} is {} mm, and the object is {} × {} × {} mm; lengths are in metres",
-        mm(*value),
-        mm(size.x),
-        mm(size.y),
-        mm(size.z)
-    ))
+    let sideways = 0.5 * size.xy().max();
+    let lengths = [
+        (GRASP_HEIGHT_HINT, 0.0..=size.z),
+        (GRASP_WIDTH_HINT, 0.0..=size.xy().norm()),
+        ("grasp_offset_m", -sideways..=sideways),
+        ("surface_m", 0.0..=size.z),
+        ("wall_m", 0.0..=sideways),
+    ];
+    let misfit = lengths.iter().find_map(|(name, range)| {
+        let value = asset.hints.get(*name).filter(|value| !range.contains(value))?;
+        Some((name, value))
+    });
+    if let Some((name, value)) = misfit {
+        return Some(format!(
+            "hints.{name} is {} mm, and the object is {} × {} × {} mm; lengths are in metres",
+            mm(*value),
+            mm(size.x),
+            mm(size.y),
+            mm(size.z)
+        ));
+    }
+    let (hint, width) = (asset.hints.get(GRASP_WIDTH_HINT)?, width_at_grasp(asset, cache)?);
+    (*hint < MIN_WIDTH_SHARE * width).then(|| {
+        format!(
+            "hints.{GRASP_WIDTH_HINT} is {} mm, and it is {} mm wide at that height; lengths are in metres",
+            mm(*hint),
+            mm(width)
+        )
+    })
+}
+
+/// Share of the width of an object below which a hint cannot mean it.
+const MIN_WIDTH_SHARE: f64 = 0.5;
+/// Points on the line across an object that measures its width.
+const WIDTH_POINTS: usize = 100;
+
+/// Width of a free object through its centre at the height of its grasp, along x or y, whichever is smaller, m. `None`
+/// if it is grasped elsewhere, or is hollow there.
+fn width_at_grasp(asset: &Asset, cache: &AssetCache) -> Option<f64> {
+    let is_free = matches!(asset.body, Body::Rigid { .. } | Body::Soft(_));
+    if !is_free || ["grasp_rim_m", "grasp_offset_m"].iter().any(|hint| asset.hints.contains_key(*hint)) {
+        return None;
+    }
+    let bounds = cache.bounds(&asset.shape);
+    let (mut centre, size) = (bounds.centre(), bounds.size());
+    centre.z = bounds.min.z + asset.hints.get(GRASP_HEIGHT_HINT).copied().unwrap_or(0.5 * size.z);
+    let width_along = |axis: usize| {
+        let step = size[axis] / WIDTH_POINTS as f64;
+        let is_inside = |point: &usize| {
+            let mut at = centre;
+            at[axis] = bounds.min[axis] + (*point as f64 + 0.5) * step;
+            asset.shape.distance(&at) < 0.0
+        };
+        (0..WIDTH_POINTS).filter(is_inside).count() as f64 * step
+    };
+    let width = width_along(0).min(width_along(1));
+    (width > 0.0).then_some(width)
 }
 
 /// Warnings about hints whose names are close to one that the standard experts read, of the asset and of its parts.

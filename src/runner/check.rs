@@ -114,7 +114,8 @@ fn check_scenes(run: &SuiteRun, scenes: &ScenePool, jobs: &EpisodeList) -> Resul
         });
         let without_strain = soft.filter(|(material, _)| material.stable_strain().is_none());
         let without_strain = without_strain.map(|(_, name)| name.clone()).collect();
-        warnings.extend(run.check_scene(task, episode, setup.scene, setup.predicates)?.map(of_task));
+        let of_scene = run.check_scene(task, episode, setup.scene, setup.predicates)?;
+        warnings.extend(of_scene.into_iter().map(of_task));
         Ok(SceneFindings { warnings, without_strain, layouts, has_changed })
     };
     let check = |position: usize| {

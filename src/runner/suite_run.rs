@@ -518,7 +518,7 @@ impl<'a> SuiteRun<'a> {
     }
 
     /// Checks the scene of an episode as far as it can be checked before anything moves. It settles only if
-    /// the goal may hold at the start. Returns a warning about its cost.
+    /// the goal may hold at the start. Returns warnings about its cost and its goal.
     ///
     /// # Errors
     /// A scene or sensor that is not valid.
@@ -528,17 +528,18 @@ impl<'a> SuiteRun<'a> {
         episode: u32,
         scene: Scene,
         predicates: Vec<Arc<dyn StatePredicate>>,
-    ) -> Result<Option<String>, RunError> {
+    ) -> Result<Vec<String>, RunError> {
         self.check_object_type(task, &scene)?;
         self.check_declared_cameras(&scene, task)?;
         let scene = Arc::new(scene);
         let settings = &self.settings;
         let sense = |source| EpisodeError::Sense { task: task.id, episode, source };
-        let check = || -> Result<Option<String>, EpisodeError> {
+        let check = || -> Result<Vec<String>, EpisodeError> {
             check_sensors(&scene, &settings.tactile, &self.sensor_assets).map_err(sense)?;
             let sim = Simulation::new(scene.clone(), &settings.physics, &settings.robot, &self.assets)?;
             sim.check_support()?;
-            if check_goal(task, &sim, &self.assets, &predicates)? {
+            let goal = check_goal(task, &sim, &self.assets, &predicates)?;
+            if goal.may_hold {
                 // Whether it holds is known once the scene has settled, with masses and contacts that are not
                 // approximate.
                 let id = self.episode_id(task, episode);
@@ -548,7 +549,13 @@ impl<'a> SuiteRun<'a> {
             }
             let mut sensors = Sensors::new(&sim, &settings.tactile, &self.sensor_assets);
             sensors.check_camera_positions(&Sensors::frame(&sim)).map_err(sense)?;
-            Ok(cost_warning(&sim.world))
+            let held_step = goal.held_step.map(|step| {
+                format!(
+                    "the first step of its sequence, {step}, holds at the start, so that it asks for nothing; leave it out, or \
+                     change the layout"
+                )
+            });
+            Ok(cost_warning(&sim.world).into_iter().chain(held_step).collect())
         };
         check().map_err(|error| self.episode_error(&error))
     }

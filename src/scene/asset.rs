@@ -15,13 +15,16 @@ pub const GRASP_WIDTH_HINT: &str = "grasp_width_m";
 /// Hint that gives the height above the lowest point of an asset where the fingers grasp it.
 pub const GRASP_HEIGHT_HINT: &str = "grasp_height_m";
 
+/// Hint that gives the share of their usual speed at which experts carry an asset.
+pub const CARRY_PACE_HINT: &str = "carry_pace";
+
 /// Hints that the standard experts read. An asset may have others, for experts of its own.
 pub const EXPERT_HINTS: [&str; 12] = [
     GRASP_HEIGHT_HINT,
     GRASP_WIDTH_HINT,
     "grasp_rim_m",
     "grasp_offset_m",
-    "carry_pace",
+    CARRY_PACE_HINT,
     "surface_m",
     "wall_m",
     "handle_height_m",

@@ -57,8 +57,8 @@ use serde::{Deserialize, Serialize};
 use softvt_geometry::{Aabb, Pose, Quat, Vec3};
 
 pub use asset::{
-    Asset, Body, EXPERT_HINTS, GRASP_HEIGHT_HINT, GRASP_WIDTH_HINT, Joint, JointMotion, MovingPart,
-    SoftMaterial, part_poses,
+    Asset, Body, CARRY_PACE_HINT, EXPERT_HINTS, GRASP_HEIGHT_HINT, GRASP_WIDTH_HINT, Joint, JointMotion,
+    MovingPart, SoftMaterial, part_poses,
 };
 pub use camera::{Camera, CameraMount, CameraSettings, MAX_CAMERAS, STANDARD_CAMERAS};
 pub use decal::{GlyphCoverage, LabelLine, MAX_LETTERS, TextDecal, Typeface};

@@ -168,7 +168,10 @@ pub fn stubs() -> String {
     functions().for_each(|function| stub_function(&mut out, "softvt.", function));
     let mut group = |doc: &str, prefix: &str, functions: &'static [Function]| {
         let _ = writeln!(out, "---{doc}\n{} = {{}}\n", prefix.trim_end_matches('.'));
-        functions.iter().for_each(|function| stub_function(&mut out, prefix, &function.signature));
+        for function in functions {
+            out.push_str("---@nodiscard\n");
+            stub_function(&mut out, prefix, &function.signature);
+        }
     };
     group("Shapes, in metres.", "softvt.shape.", SHAPES);
     group("Masks: weights of the layers of a visual.", "softvt.mask.", MASKS);
@@ -242,6 +245,10 @@ fn stub_class(out: &mut String, class: &Class) {
     let short = class.short_name();
     let _ = writeln!(out, "local {short} = {{}}\n");
     for method in class.methods {
+        // A method that makes another value of its class changes nothing else.
+        if method.returns == [class.name] {
+            out.push_str("---@nodiscard\n");
+        }
         stub_function(out, &format!("{short}:"), method);
     }
 }

@@ -41,6 +41,21 @@ fn warnings_are_printed_and_errors_refused() {
 }
 
 #[test]
+fn a_shape_that_a_script_does_not_use_is_a_warning() {
+    let text = Small::default().text();
+    let of = |line: &str| {
+        let text = format!(
+            "local shape = softvt.shape.box {{ size = {{ 1, 1, 1 }} }}\n{line}\nprint(shape:volume())\n{text}"
+        );
+        Project::new(&[("x.lua", &text)]).succeeds("check x.lua").err
+    };
+    let expected =
+        "softvt: warning: x.lua:2: makes a shape that is not used; the methods of a shape return a new one";
+    assert!(of("shape:translate(0, 0, 1)").contains(expected), "{}", of("shape:translate(0, 0, 1)"));
+    assert!(!of("shape = shape:translate(0, 0, 1)").contains("a shape"));
+}
+
+#[test]
 fn a_twin_of_a_rigid_suite_is_refused() {
     let text = Small::default().text().replace("\"deformable\"", "\"rigid\"");
     assert_eq!(

@@ -154,6 +154,20 @@ fn implausible_units_and_wide_objects_are_doubted() {
     assert!(!misspelt.contains("weight"), "{misspelt}");
     let beside = "asset cube: hints.grasp_width_m is 20000 mm, and the object is 40 × 40 × 40 mm; lengths are in metres";
     assert!(misspelt.contains(beside), "{misspelt}");
+    for (hints, expected) in [
+        ("grasp_width_m = 0.004", "hints.grasp_width_m is 4 mm, and it is 40 mm wide at that height"),
+        ("grasp_width_m = 0.02", ""),
+        ("grasp_offset_m = 0.03", "hints.grasp_offset_m is 30 mm, and the object is 40 × 40 × 40 mm"),
+        ("surface_m = 20", "hints.surface_m is 20000 mm, and the object is 40 × 40 × 40 mm"),
+        ("wall_m = -0.001", "hints.wall_m is -1 mm, and the object is 40 × 40 × 40 mm"),
+        ("carry_pace = 0", "hints.carry_pace is 0; expected a number above 0, at most 1"),
+    ] {
+        let hinted = format!("hints = {{ {hints} }}, name = \"cube\", shape");
+        let text = Small::default().text().replace("name = \"cube\", shape", &hinted);
+        let warned = warnings(&Project::new(&[("x.lua", &text)]));
+        assert!(warned.contains(expected), "{hints}: {warned}");
+        assert_eq!(warned.contains("hints."), !expected.is_empty(), "{hints}: {warned}");
+    }
     let ball = "softvt.shape.sphere { radius = 0.02 }";
     let text = Small::default()
         .text()
@@ -163,6 +177,22 @@ fn implausible_units_and_wide_objects_are_doubted() {
     assert!(pieces.contains("asset cube: its shape has 2 separate pieces, "), "{pieces}");
     let expected = "task 0: its goal moves no soft object, only cube, so that no deformation is judged";
     assert!(pieces.contains(expected), "{pieces}");
+}
+
+#[test]
+fn a_first_step_that_holds_at_the_start_is_a_warning() {
+    let on = "softvt.on { object = \"cube\", target = \"post\" }";
+    let of = |steps: &str| {
+        let text = Small::default().text().replace(on, &format!("softvt.sequence {{ {steps} }}"));
+        warnings(&Project::new(&[("x.lua", &text)]))
+    };
+    let upright = "softvt.upright { object = \"cube\" }";
+    let expected = "task 0: the first step of its sequence, cube upright, holds at the start, so that it asks for nothing";
+    let found = of(&format!("{upright}, {on}"));
+    assert!(found.contains(expected), "{found}");
+    let found = of(&format!("softvt.all {{ {upright} }}, {on}"));
+    assert!(found.contains("the first step of its sequence, "), "{found}");
+    assert!(!of(&format!("{on}, {upright}")).contains("sequence"));
 }
 
 #[test]

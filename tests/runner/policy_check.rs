@@ -286,11 +286,17 @@ const fn case(fault: &'static str, expected: &'static [&'static str], answer: An
     Case { fault, answer, expected }
 }
 
-const POSITIONS: [Case; 22] = [
+const POSITIONS: [Case; 24] = [
     case("none", &[], pose),
     case("numbers that are not finite", &["answers: demonstration 1, step 0: "], |_| vec![f64::NAN; 7]),
     case("reversed in time", &["order: the answers look reversed in time ("], |a| {
         at(a, a.step + CHUNK - 1 - a.index)
+    }),
+    case("five steps early", &["time: the answers are 5 control steps early ("], |a| {
+        at(a, a.step + a.index + 5)
+    }),
+    case("ten steps late", &["time: the answers are 10 control steps late ("], |a| {
+        at(a, (a.step + a.index).saturating_sub(10))
     }),
     case("noise of 5 mm, one step late, a tighter grip", &[], |a| {
         let action = a.at((a.step + a.index).saturating_sub(1)).action;

@@ -37,6 +37,11 @@ pub(super) fn run(args: CheckArgs) -> Result<(), CliError> {
     let ConfiguredScript { config, script: loaded } = &run;
     let plan = &loaded.plan;
     check_distinct_out_dirs(config, plan.suites())?;
+    for place in loaded.unused_shapes()? {
+        eprint_notice(format!(
+            "warning: {place}: makes a shape that is not used; the methods of a shape return a new one: shape = shape:translate(…)"
+        ));
+    }
     let checker = SuiteChecker::new(&run);
     for suite in plan.suites() {
         checker.check(suite, args.episodes, |warning| eprint_notice(format!("warning: {warning}")))?;

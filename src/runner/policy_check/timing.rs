@@ -1,4 +1,4 @@
-//! The speed at which answers advance along the demonstrations.
+//! The control steps of the demonstrations that answers stand for.
 
 use super::{
     agreement::{CLEARLY_BETTER, EXPLAINS, VectorPair, correlation, factor, mean},
@@ -10,6 +10,8 @@ use softvt_geometry::Vec3;
 /// Recorded control steps per command that are considered, besides one.
 const RATES: [f64; 14] =
     [0.5, 2.0, 0.25, 4.0, 1.0 / 3.0, 3.0, 2.0 / 3.0, 4.0 / 3.0, 0.2, 5.0, 0.4, 6.0, 0.125, 8.0];
+/// Control steps by which answers may be late or early that are considered. One is within what policies differ by.
+const LAGS: std::ops::RangeInclusive<i32> = 2..=10;
 /// Commands that an answer needs to tell its rate.
 const LEAST_COMMANDS: usize = 4;
 /// Mean error below which the order of an answer is not doubted, m.
@@ -23,9 +25,11 @@ enum Phase {
     First,
     Last,
     Repeated,
+    /// As many control steps later than commands should.
+    Shifted(i32),
 }
 
-/// Commands that stand for more or less than a control step.
+/// Commands that stand for other control steps than theirs.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Stretch {
     /// Recorded control steps per command.
@@ -37,7 +41,7 @@ pub(super) struct Stretch {
 #[derive(Clone, Debug)]
 pub(super) struct TimingFinding {
     pub text: String,
-    /// Other than 1 command per control step; `None` if the answers hold the pose of the observation.
+    /// Other control steps than those of the commands; `None` if the answers hold the pose of the observation.
     pub stretch: Option<Stretch>,
 }
 
@@ -52,6 +56,10 @@ struct StretchFit {
 impl Stretch {
     const NONE: Self = Self { rate: 1.0, phase: Phase::First };
 
+    const fn shifted(steps: i32) -> Self {
+        Self { rate: 1.0, phase: Phase::Shifted(steps) }
+    }
+
     fn steps(self, command: usize) -> f64 {
         let command = command as f64;
         match self.phase {
@@ -59,6 +67,7 @@ impl Stretch {
             Phase::Last => self.rate * (command + 1.0) - 1.0,
             // Thirds are not exact.
             Phase::Repeated => (self.rate * command + 1e-9).floor(),
+            Phase::Shifted(steps) => command + f64::from(steps),
         }
     }
 }
@@ -163,19 +172,31 @@ pub(super) fn explain_timing(demos: &[DemoSamples]) -> Option<TimingFinding> {
         });
     }
     let fit = best?;
-    let StretchFit { stretch: Stretch { rate, .. }, error, .. } = fit;
-    let hz = f64::from(CONTROL_HZ) / rate;
-    Some(TimingFinding {
-        text: format!(
-            "rate: the answers advance {} control steps of the demonstrations per action (mean error {:.1} mm at one step per \
-             action, {:.1} mm so read): actions are executed at {CONTROL_HZ} Hz, these look like {} Hz: resample them",
-            short(rate),
-            1e3 * before_of(demos),
-            1e3 * error,
-            short(hz)
-        ),
-        stretch: Some(fit.stretch),
-    })
+    Some(TimingFinding { text: fit.words(before_of(demos)), stretch: Some(fit.stretch) })
+}
+
+impl StretchFit {
+    /// What it says of the answers; `before` is their mean error at one control step per command, m.
+    fn words(&self, before: f64) -> String {
+        let Self { stretch: Stretch { rate, phase }, error, .. } = *self;
+        let errors =
+            |read: &str| format!("(mean error {:.1} mm {read}, {:.1} mm so read)", 1e3 * before, 1e3 * error);
+        match phase {
+            Phase::Shifted(steps) => format!(
+                "time: the answers are {} control steps {} {}: the first action of an answer is that of the observation",
+                steps.abs(),
+                if steps > 0 { "early" } else { "late" },
+                errors("as received")
+            ),
+            _ => format!(
+                "rate: the answers advance {} control steps of the demonstrations per action {}: actions are executed at \
+                 {CONTROL_HZ} Hz, these look like {} Hz: resample them",
+                short(rate),
+                errors("at one step per action"),
+                short(f64::from(CONTROL_HZ) / rate)
+            ),
+        }
+    }
 }
 
 fn short(x: f64) -> String {
@@ -201,7 +222,8 @@ fn best_stretch(demos: &[DemoSamples]) -> Option<StretchFit> {
     };
     let phases =
         |rate: f64| [Phase::First, Phase::Last, Phase::Repeated].map(|phase| Stretch { rate, phase });
-    let fits = RATES.into_iter().flat_map(phases).map(fit);
+    let lags = LAGS.flat_map(|steps| [steps, -steps]).map(Stretch::shifted);
+    let fits = RATES.into_iter().flat_map(phases).chain(lags).map(fit);
     let explained = fits.filter(|fit| fit.correlation >= EXPLAINS && fit.error <= CLEARLY_BETTER * before);
     let best = explained.min_by(|a, b| a.error.total_cmp(&b.error))?;
     // A longer displacement is a matter of units where answers are displacements, and one of the rate elsewhere.

@@ -202,6 +202,7 @@ pub(crate) fn install(lua: &Lua, api: &Table) -> mlua::Result<()> {
         api.set(record.constructor(), constructor)?;
     }
     functions().try_for_each(|function| function.install(lua, api, "softvt."))?;
+    lua.set_app_data(shapes::UnusedShapes::default());
     let shapes = lua.create_table()?;
     shapes::SHAPES.iter().try_for_each(|function| function.install(lua, &shapes, "shape."))?;
     api.set("shape", shapes)?;

@@ -1,6 +1,13 @@
 //! Shapes: immutable values with chained methods. All lengths are in metres.
 
-use std::{f64::consts::TAU, sync::Arc};
+use std::{
+    collections::BTreeSet,
+    f64::consts::TAU,
+    sync::{
+        Arc, Mutex,
+        atomic::{AtomicBool, Ordering},
+    },
+};
 
 use mlua::Lua;
 
@@ -11,7 +18,7 @@ use super::{
 use crate::{
     schema::{Range, Type, choice, class, functions, record_of},
     vm::{
-        error::{app_data, current_line, fail},
+        error::{SourceLine, app_data, author_line, current_line, fail},
         library::{LibraryError, SharedLibrary},
         memory_budget::{Reservation, reserve},
     },
@@ -58,7 +65,48 @@ struct Node {
     colours: Result<Vec<Arc<FileColours>>, String>,
     /// Memory it keeps, bytes; parts shared with other shapes count for each of them.
     bytes: usize,
+    use_mark: UseMark,
     _reserved: Reservation,
+}
+
+/// Lines of a script that made a shape which nothing read before it was dropped, such as the result of a method that
+/// was not kept.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct UnusedShapes(Arc<Mutex<BTreeSet<SourceLine>>>);
+
+impl UnusedShapes {
+    /// The lines so far, each as `file:line`.
+    pub(crate) fn lines(lua: &Lua) -> mlua::Result<Vec<String>> {
+        lua.gc_collect()?;
+        let unused = app_data::<Self>(lua)?;
+        Ok(lock(&unused.0).iter().map(ToString::to_string).collect())
+    }
+}
+
+/// Whether something read a shape; reports it as unused on drop otherwise.
+#[derive(Debug)]
+struct UseMark {
+    is_used: AtomicBool,
+    made_at: Option<SourceLine>,
+    unused: UnusedShapes,
+}
+
+impl UseMark {
+    fn new(lua: &Lua) -> mlua::Result<Self> {
+        Ok(Self { is_used: AtomicBool::new(false), made_at: author_line(lua), unused: app_data(lua)? })
+    }
+
+    fn set(&self) {
+        self.is_used.store(true, Ordering::Relaxed);
+    }
+}
+
+impl Drop for UseMark {
+    fn drop(&mut self) {
+        if !*self.is_used.get_mut() {
+            lock(&self.unused.0).extend(self.made_at.take());
+        }
+    }
 }
 
 impl LuaShape {
@@ -71,6 +119,7 @@ impl LuaShape {
     }
 
     pub(crate) fn shape(&self) -> &Shape {
+        self.0.use_mark.set();
         &self.0.shape
     }
 
@@ -107,12 +156,13 @@ impl LuaShape {
         }
         shape.validate().map_err(|error| fail(lua, format!("shape.{error}")))?;
         let bytes = nodes * size_of::<Shape>() + extra_bytes;
-        Ok(Self(Arc::new(Node { shape, colours, bytes, _reserved: reserve(lua, bytes)? })))
+        let use_mark = UseMark::new(lua)?;
+        Ok(Self(Arc::new(Node { shape, colours, bytes, use_mark, _reserved: reserve(lua, bytes)? })))
     }
 
     /// A copy of its tree.
     pub(crate) fn copy(&self) -> Shape {
-        self.0.shape.clone()
+        self.shape().clone()
     }
 
     /// Checks that a wall leaves something of the inside free.

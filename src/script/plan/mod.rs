@@ -18,6 +18,7 @@ use crate::{
         self,
         goals::DeclaredPredicate,
         policy::{PolicySpec, ProfileSpec},
+        shapes::UnusedShapes,
         simulation::settings,
         tasks::{ConditionSpec, ConditionsSpec, ExperimentSpec, SuiteSpec, TaskSpec},
     },
@@ -109,6 +110,16 @@ impl LoadedScript {
         let mut hashes = self.sources.bundle.hashes();
         hashes.extend(self.variation_files.clone());
         hashes
+    }
+
+    /// Lines, as `file:line`, of shapes that the script makes and does not use, such as the result of a method that it
+    /// does not keep. Runs the script again.
+    ///
+    /// # Errors
+    /// As [`load`].
+    pub fn unused_shapes(&self) -> Result<Vec<String>, ScriptError> {
+        let instance = self.sources.instance()?;
+        UnusedShapes::lines(&instance.vm.lua).map_err(|e| instance.vm.explain(&e))
     }
 }
 

@@ -7,7 +7,7 @@ use mlua::{Lua, debug::Debug};
 use super::library::embedded;
 
 /// A line of a script.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) struct SourceLine {
     pub file: String,
     /// From 1.
