@@ -1,6 +1,5 @@
 """softvt as a Gymnasium environment: a client of `softvt serve` that starts its own server, or connects to one."""
 
-import inspect
 import math
 import os
 import shutil
@@ -53,6 +52,13 @@ _OTHER_NUMBERS = ("task", "episode", "step", "carried_out")
 _SENSOR_EDGE = 240  # pixels of each image of the render mode "sensors"
 # Key of `get_state` for the last true states, which the server does not keep.
 _PAST_STATES = "past_true_states"
+# Flags of `softvt serve` and what sets them.
+_SET_BY = {
+    "--profile": "the arguments profile, obs, control, gripper, history and cameras",
+    "--split": "the argument split",
+    "--gripper": "the argument gripper",
+    **dict.fromkeys(("--port", "--threads", "--token", "--until-stdin-closes"), "the environment for its own server"),
+}
 # Servers, suites and tasks whose goals were checked, so that a vector does it once.
 _with_true_state: set[tuple[str, str, int]] = set()
 
@@ -77,12 +83,12 @@ class SoftVTEnv(gymnasium.Env[Observation, np.ndarray]):
         suite: str | None = None,
         task: int | str | Sequence[int] | None = 0,
         obs: str | Sequence[str] | None = None,
-        control: str = "delta",
-        gripper: str = "continuous",
+        control: str | None = None,
+        gripper: str | None = None,
         reward: str = "sparse",
         layout: str = "flat",
-        history: int = 1,
-        cameras: Sequence[str] = ("third_person", "wrist"),
+        history: int | None = None,
+        cameras: Sequence[str] | None = None,
         image_size: int | Sequence[int] | None = None,
         profile: str | os.PathLike[str] | None = None,
         cost: bool = True,
@@ -100,27 +106,27 @@ class SoftVTEnv(gymnasium.Env[Observation, np.ndarray]):
 
         script: a Lua file that returns a suite or a list of suites, or the name of a standard suite, such as "object_soft".
         url, token: a running server in place of the script. `control`, `gripper`, `history`, `cameras`, `image_size`, `profile` and `flags`
-            are then those of the server.
+            are then those of the server, and are refused here.
         suite: name of one of several suites of the script; by default the first.
         task: number of a task, part of its prompt, or several numbers, of which each reset draws one; None for all tasks.
         obs: parts of the observation (`softvt.profile.PARTS`), such as "state", or joined by +, such as "pixels+proprio". By default "state";
             with `url`, all that the server sends. Not with `profile`, which states its own.
-        control: "delta" (fractions −1..1 of 20 mm and 0.2 rad), "delta_osc" (of 50 mm and 0.5 rad, as LIBERO has them), "pose" (absolute), or
-            "joints" (positions of the seven joints, rad).
-        gripper: grip code of the last number of an action: "continuous", "binary", "two-width" or "force".
+        control: "delta" (fractions −1..1 of 20 mm and 0.2 rad, the default), "delta_osc" (of 50 mm and 0.5 rad, as LIBERO has them), "pose"
+            (absolute), or "joints" (positions of the seven joints, rad).
+        gripper: grip code of the last number of an action: "continuous" (the default), "binary", "two-width" or "force".
         reward: 1 at the goal ("sparse"), 1 at a goal reached safely ("safety"), or the increase of progress ("staged").
         layout: keys of the observation: "flat", or those that LeRobot reads.
-        history: control steps of each entry, the present one last, along a first axis if there are several.
-        cameras: names of the cameras of pixels, depth and segmentation. Only with one of them in `obs`.
+        history: control steps of each entry, the present one last, along a first axis if there are several; by default 1.
+        cameras: names of the cameras of pixels, depth and segmentation, by default ("third_person", "wrist"). Only with one of them in `obs`.
         image_size: pixels of the camera images, (height, width) or one number for both; by default those of the scene. Only with such a part,
             a profile, or render_mode="rgb_array".
-        profile: a profile of softvt by name or file, in place of `obs`, `control`, `gripper`, `history` and `cameras`.
+        profile: a profile of softvt by name or file, in place of `obs`, `control`, `gripper`, `history` and `cameras`, which are refused beside it.
         cost: True for `info["cost"]`, which needs a server with access to the true state (`--privileged`).
         privileged: True for `info["verdict"]` and `info["state"]`.
         split: list of episodes, "validation", "demonstration" or "experiment"; by default that of the server, "validation".
         first_seed: seed of episode 0.
         freeze: True to repeat the last transition after the end of an episode, until a reset with a seed or with the option of lerobot-eval.
-        flags: further flags of `softvt serve`, such as ("--shift", "stiffness=0.5").
+        flags: further flags of `softvt serve`, such as ("--shift", "stiffness=0.5"). Not those that arguments set.
         binary: the program; by default `softvt.find_binary()`.
         render_mode: "rgb_array" for the image of `camera`, or "sensors" for both cameras above both fingers.
         camera: a camera's name (default: the scene's first), or "left" or "right" for a finger. Only with render_mode="rgb_array".
@@ -130,19 +136,21 @@ class SoftVTEnv(gymnasium.Env[Observation, np.ndarray]):
         """
         require_one_of("reward", reward, REWARDS)
         require_one_of("layout", layout, LAYOUTS)
-        require_one_of("control", control, CONTROLS)
-        require_one_of("gripper", gripper, GRIPPERS)
-        if render_mode is not None:
-            require_one_of("render_mode", render_mode, _RENDER_MODES)
-        if split is not None:
-            require_one_of("split", split, SPLITS)
+        for name, value, known in (
+            ("control", control, CONTROLS),
+            ("gripper", gripper, GRIPPERS),
+            ("render_mode", render_mode, _RENDER_MODES),
+            ("split", split, SPLITS),
+        ):
+            if value is not None:
+                require_one_of(name, value, known)
         for name, value in (("cost", cost), ("privileged", privileged), ("freeze", freeze)):
             require_bool(name, value)
         for name, text in (("url", url), ("token", token), ("camera", camera)):
             if text is not None:
                 require_text(name, text)
         first_seed = whole_number("first_seed", first_seed)
-        cameras, flags = texts("cameras", cameras), texts("flags", flags)
+        cameras, flags = None if cameras is None else texts("cameras", cameras), texts("flags", flags)
         image_shape = _image_shape(image_size)
         script, profile = _path("script", script), _path("profile", profile)
         if registered_suite is not None:
@@ -155,9 +163,10 @@ class SoftVTEnv(gymnasium.Env[Observation, np.ndarray]):
         if (script is None) == (url is None):
             raise ValueError("give either the script of a suite or the url of a server")
         own = {"control": control, "gripper": gripper, "history": history, "cameras": cameras}
-        _refuse_changed("profile", profile, own)
-        _refuse_changed("url", url, {**own, "profile": profile, "image_size": image_size, "flags": flags, "binary": binary})
-        _refuse_changed("script", script, {"token": token})
+        _refuse_given("profile", profile, own)
+        _refuse_given("url", url, {**own, "profile": profile, "image_size": image_size, "flags": flags or None, "binary": binary})
+        _refuse_given("script", script, {"token": token})
+        _refuse_flags(flags, {"--split": split is not None, "--gripper": gripper is not None})
         if profile is not None and obs is not None:
             raise ValueError(
                 f"obs={obs!r} and profile={profile!r}: a profile states all observations; leave out one of them. The true state is in "
@@ -169,6 +178,10 @@ class SoftVTEnv(gymnasium.Env[Observation, np.ndarray]):
             parts = parse_parts(obs)
         if url is None and parts is not None:
             _refuse_without_effect(parts, obs, cameras, image_size, history, render_mode)
+        control = "delta" if control is None else control
+        gripper = "continuous" if gripper is None else gripper
+        history = 1 if history is None else history
+        cameras = ("third_person", "wrist") if cameras is None else cameras
         if camera is not None and render_mode != "rgb_array":
             raise ValueError(
                 f"camera={camera!r} has no effect with render_mode={render_mode!r}; give render_mode='rgb_array', or leave it out"
@@ -184,7 +197,7 @@ class SoftVTEnv(gymnasium.Env[Observation, np.ndarray]):
             spec = None if profile or parts is None else ProfileSpec(parts, control, gripper, cameras, history)
             if image_shape is not None and any("cameras.width=" in flag or "cameras.height=" in flag for flag in flags):
                 raise ValueError("image_size sets cameras.width and cameras.height; leave them out of flags, or image_size")
-            own_flags = _flags(profile, image_shape, needs_truth) + flags
+            own_flags = _flags(profile, image_shape, needs_truth and "--privileged" not in flags) + flags
             self._lease = lease(_script(script), own_flags, binary, None if spec is None else spec.to_lua())
             self._connect = self._lease.connect
         else:
@@ -592,22 +605,27 @@ def _refuse_other_suites(registered: str, script: str | None, url: str | None) -
             raise ValueError(f"{name}={value!r}: {known} is the suite {registered}; write gymnasium.make({FILE_ID!r}, {name}={value!r})")
 
 
-def _refuse_changed(cause: str, given: object, arguments: Mapping[str, object]) -> None:
-    """Raises ValueError for arguments that have no effect where another one is given."""
-    if given is None:
-        return
-    defaults = {name: parameter.default for name, parameter in inspect.signature(SoftVTEnv.__init__).parameters.items()}
+def _refuse_given(cause: str, given: object, arguments: Mapping[str, object]) -> None:
+    """Raises ValueError for arguments that have no effect where another one is given, also with the value of their default."""
     for name, value in arguments.items():
-        if value != defaults[name]:
+        if given is not None and value is not None:
             raise ValueError(f"{name}={value!r} has no effect with {cause}={given!r}; leave it out")
+
+
+def _refuse_flags(flags: tuple[str, ...], given: Mapping[str, bool]) -> None:
+    """Raises ValueError for flags that an argument sets. `given` has those that may replace their argument, and whether it is given too."""
+    for flag in flags:
+        name = flag.split("=")[0]
+        if name in _SET_BY and given.get(name, True):
+            raise ValueError(f"flags={flags!r}: {name} is set by {_SET_BY[name]}; leave it out of flags")
 
 
 def _refuse_without_effect(
     parts: Sequence[str],
     obs: object,
-    cameras: tuple[str, ...],
+    cameras: tuple[str, ...] | None,
     image_size: object,
-    history: int,
+    history: int | None,
     render_mode: str | None,
 ) -> None:
     """Raises ValueError for arguments that change nothing about these parts of an observation."""
@@ -615,11 +633,11 @@ def _refuse_without_effect(
     found = f"obs={shown!r}"
     pictures = "which has no pixels, depth or segmentation; leave it out"
     if not any(part in CAMERA_PARTS for part in parts):
-        if cameras != inspect.signature(SoftVTEnv.__init__).parameters["cameras"].default:
+        if cameras is not None:
             raise ValueError(f"cameras={cameras!r} has no effect with {found}, {pictures}")
         if image_size is not None and render_mode != "rgb_array":
             raise ValueError(f"image_size={image_size!r} has no effect with {found}, {pictures}")
-    if history != 1 and parts and all(part in PARTS_OF_ONE_STEP for part in parts):
+    if history not in (None, 1) and parts and all(part in PARTS_OF_ONE_STEP for part in parts):
         raise ValueError(f"history={history!r} has no effect with {found}; leave it out")
 
 

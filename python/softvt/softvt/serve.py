@@ -296,7 +296,7 @@ def lease(script: str, flags: Sequence[str] = (), binary: str | None = None, pro
         if shared is None or not shared.server.is_running:
             server = Server(script, *flags, binary=program, profile=profile)
             # A server that records a run prints its results when it ends.
-            shared = _servers[key] = _SharedServer(key, server, lingers="--out" not in flags)
+            shared = _servers[key] = _SharedServer(key, server, lingers=not any(flag.split("=")[0] == "--out" for flag in flags))
             _announce(key, server)
         return shared.lease()
 

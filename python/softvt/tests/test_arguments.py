@@ -73,6 +73,25 @@ class Arguments(unittest.TestCase):
                 ({"script": "object_soft", "render_mode": "window"}, "render_mode='window'"),
                 ({"script": "object_soft", "profile": "vision", "control": "pose"}, "control='pose' has no effect with profile='vision'"),
                 ({"url": "ws://127.0.0.1:9", "image_size": 64}, "image_size=64 has no effect with url="),
+                # Values of the defaults contradict as well.
+                ({"url": "ws://127.0.0.1:9", "control": "delta"}, "control='delta' has no effect with url=.*; leave it out"),
+                ({"url": "ws://127.0.0.1:9", "gripper": "continuous"}, "gripper='continuous' has no effect with url="),
+                ({"script": "object_soft", "profile": "vision", "history": 1}, "history=1 has no effect with profile='vision'"),
+                (
+                    {"script": "object_soft", "profile": "vision", "cameras": ("third_person", "wrist")},
+                    r"cameras=\('third_person', 'wrist'\) has no effect with profile='vision'",
+                ),
+                ({"script": "object_soft", "cameras": ["third_person", "wrist"]}, "cameras=.* has no effect with obs='state'"),
+                (
+                    {"script": "object_soft", "split": "validation", "flags": ("--split=experiment",)},
+                    "--split is set by the argument split; leave it out of flags",
+                ),
+                (
+                    {"script": "object_soft", "gripper": "continuous", "flags": ("--gripper", "binary")},
+                    "--gripper is set by the argument gripper",
+                ),
+                ({"script": "object_soft", "flags": ("--profile", "vision")}, "--profile is set by the arguments profile, obs, control"),
+                ({"script": "object_soft", "flags": ("--token", "t")}, "--token is set by the environment for its own server"),
                 ({"script": "object_soft", "token": "t"}, "token='t' has no effect"),
                 ({"script": "object_soft", "profile": "libero", "obs": "pixels"}, "obs='pixels' and profile='libero': .* leave out one"),
                 ({"script": "object_soft", "image_size": 64}, "image_size=64 has no effect with obs='state'"),
@@ -120,7 +139,7 @@ class Arguments(unittest.TestCase):
                 ("flags", "--shift stiffness=0.5", r'expected a list; write flags=\("--shift", "stiffness=0.5"\)'),
                 ("flags", ("--shift", 0.5), "got 0.5 in it"),
                 ("cost", "no", "expected True or False"),
-                ("gripper", None, "expected 'continuous'"),
+                ("gripper", 3, "expected 'continuous'"),
             ]:
                 with self.subTest(argument, value=value), self.assertRaises(ValueError) as caught:
                     softvt.SoftVTEnv("object_soft", **{"obs": "pixels", argument: value})

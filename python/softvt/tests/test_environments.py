@@ -69,6 +69,10 @@ class Environments(unittest.TestCase):
         self.addCleanup(own.close)
         self.assertEqual(own.get_wrapper_attr("_max_episode_steps"), STEPS)
 
+    def test_flags_may_replace_arguments_that_are_not_given(self):
+        env = self.make(obs="proprio", flags=("--split", "experiment", "--gripper", "binary", "--privileged"))
+        self.assertEqual([env.hello[key] for key in ("split", "gripper", "pose", "privileged")], ["experiment", "binary", "delta", True])
+
     def test_impossible_tasks_suites_and_parts_are_refused(self):
         for arguments, words in [
             ({"task": 99}, "task 99: suite spatial_soft has the tasks 0 to 9"),
