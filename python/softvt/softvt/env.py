@@ -71,9 +71,6 @@ class SoftVTEnv(gymnasium.Env[Observation, np.ndarray]):
 
     metadata = {"render_modes": [*_RENDER_MODES], "render_fps": 20}
 
-    task_description: str
-    """The prompt of the present episode."""
-
     def __init__(
         self,
         script: str | os.PathLike[str] | None = None,
@@ -193,6 +190,8 @@ class SoftVTEnv(gymnasium.Env[Observation, np.ndarray]):
         self._has_cost, self._has_readings = cost, privileged
         self._parts, self._split, self._first_seed = parts, split, first_seed
         self._lease: Lease | None = None
+        # True in an episode of a recorded run that was begun by an action and has not ended.
+        self._is_open = False
         if script is not None:
             spec = None if profile or parts is None else ProfileSpec(parts, control, gripper, cameras, history)
             if image_shape is not None and any("cameras.width=" in flag or "cameras.height=" in flag for flag in flags):
@@ -264,8 +263,8 @@ class SoftVTEnv(gymnasium.Env[Observation, np.ndarray]):
         self._suite = name
         self._prompts = {entry["task"]: entry["prompt"] for entry in suites[name]["tasks"]}
         self._tasks = _tasks(name, task, self._prompts)
-        self.task = self._tasks[0]
-        self.task_description = self._prompts[self.task]
+        self._task = self._tasks[0]
+        self._prompt = self._prompts[self._task]
         budgets = {entry["task"]: entry["budget_steps"] for entry in suites[name]["tasks"]}
         # The name under which Gymnasium's TimeLimit has it, and under which LeRobot asks for it.
         self._max_episode_steps = max(budgets[task] for task in self._tasks)
@@ -280,7 +279,12 @@ class SoftVTEnv(gymnasium.Env[Observation, np.ndarray]):
         self._progress = 0.0
         self._last: Step | None = None
         self._pending = ""
-        self._has_warned = False
+        self._warned: set[str] = set()
+        # Seed and split of the list of the present episode, and of the one that `end_reset` starts.
+        self._episode, self._list = 0, self._list_of({})
+        self._pending_list = self._list
+        # Number of episodes of each task in the run that the server records.
+        self._run_episodes: int = suites[name]["episodes"] if hello["records"] else 0
         # True while the only episode of the server is that of `_probe`.
         self._has_probe = False
 
@@ -334,7 +338,15 @@ class SoftVTEnv(gymnasium.Env[Observation, np.ndarray]):
 
     def close(self) -> None:
         """Closes the connection, and ends the server after its last environment. A second call has no effect."""
+        self._warn_of_left_episode()
         self._closer()
+
+    def __reduce__(self) -> Any:
+        # Also for copy.deepcopy.
+        raise TypeError(
+            f"a {type(self).__name__} has a connection to a server and cannot be pickled or copied; make it inside of the worker, by a function: "
+            'lambda: gymnasium.make("softvt/ObjectSoft-v0", …). get_state and set_state carry an episode from one environment to another'
+        )
 
     # What softvt offers besides.
 
@@ -361,7 +373,7 @@ class SoftVTEnv(gymnasium.Env[Observation, np.ndarray]):
         requested = {"suite": self._suite, "task": task, "episode": episode, "split": self._split, **options}
         self._last = None
         self._client.send("reset", **{key: value for key, value in requested.items() if value is not None})
-        self._pending = "reset"
+        self._pending, self._pending_list = "reset", self._list_of(requested)
 
     def end_reset(self) -> tuple[Observation, dict[str, Any]]:
         """Waits for `begin_reset`."""
@@ -369,7 +381,11 @@ class SoftVTEnv(gymnasium.Env[Observation, np.ndarray]):
             assert self._last is not None
             observation, _, _, _, info = self._last
             return observation, info
-        return self._restart(self._client.receive())
+        response = self._client.receive()
+        self._warn_of_left_episode()
+        restarted = self._restart(response, self._pending_list)
+        self._warn_of_other_episode()
+        return restarted
 
     def begin_step(self, action: np.ndarray) -> None:
         """As `step`, without waiting; `end_step` has to follow."""
@@ -399,11 +415,17 @@ class SoftVTEnv(gymnasium.Env[Observation, np.ndarray]):
         info = self._info(response["info"], before)
         reward = self._reward_of(response, state)
         terminated, truncated = bool(response["terminated"]), bool(response["truncated"])
+        self._is_open = self._is_of_run() and not (terminated or truncated)
+        self._freeze_end(response, observation, info)
+        return observation, reward, terminated, truncated, info
+
+    def _freeze_end(self, response: Mapping[str, Any], observation: Observation, info: dict[str, Any]) -> None:
+        """Keeps the last transition of an episode for an environment that repeats it."""
+        terminated, truncated = bool(response["terminated"]), bool(response["truncated"])
         if self._freezes and (terminated or truncated):
             # Its costs have been counted.
             frozen = {key: 0.0 if key == "cost" or key.startswith("cost_") else value for key, value in info.items()}
             self._last = (observation, 0.0, terminated, truncated, frozen)
-        return observation, reward, terminated, truncated, info
 
     def get_state(self) -> dict[str, Any]:
         """State of the episode as plain data, for `set_state` of this or an equal environment."""
@@ -413,17 +435,32 @@ class SoftVTEnv(gymnasium.Env[Observation, np.ndarray]):
         return state
 
     def set_state(self, state: dict[str, Any]) -> tuple[Observation, dict[str, Any]]:
-        """Restores a state bit for bit; returns what `reset` does."""
+        """Restores a state bit for bit, also after the end of an episode; returns what `reset` does. Wrappers of Gymnasium do not notice it: a
+        TimeLimit counts on."""
         self._reconnect_if_interrupted()
         restored = dict(state) if isinstance(state, Mapping) else state
         past = restored.pop(_PAST_STATES, None) if isinstance(restored, dict) else None
-        return self._restart(self._client.request("set_state", state=restored), past)
+        response = self._client.request("set_state", state=restored)
+        self._warn_of_left_episode()
+        observation, info = self._restart(response, self._list_of(restored), past)
+        self._freeze_end(response, observation, info)
+        return observation, info
 
     def camera_matrices(self) -> dict[str, dict[str, Any]]:
         """Of each camera by name, in the present state: `width` and `height` of its image, pixels, its matrix `intrinsic` (3, 3), and its pose in
         the robot's base frame `pose_b` (4, 4), with the axes of OpenGL: x right, y up, view along −z."""
         cameras: dict[str, dict[str, Any]] = self._ask("cameras")["cameras"]
         return cameras
+
+    @property
+    def task(self) -> int:
+        """Number of the task of the present episode. The argument `task` or an option of `reset` chooses it."""
+        return self._task
+
+    @property
+    def task_description(self) -> str:
+        """The prompt of the present episode."""
+        return self._prompt
 
     @property
     def hello(self) -> dict[str, Any]:
@@ -434,12 +471,14 @@ class SoftVTEnv(gymnasium.Env[Observation, np.ndarray]):
         pending, self._pending = self._pending, ""
         return pending
 
-    def _restart(self, response: dict[str, Any], past: Sequence[Sequence[float]] | None = None) -> tuple[Observation, dict[str, Any]]:
-        """Takes in the first answer of an episode, or of a restored state with the true states up to it."""
+    def _restart(
+        self, response: dict[str, Any], episode_list: tuple[int, str], past: Sequence[Sequence[float]] | None = None
+    ) -> tuple[Observation, dict[str, Any]]:
+        """Takes in the first answer of an episode of a list, or of a restored state with the true states up to it."""
         raw = response["info"]
         self._last, self._has_probe = None, False
-        self.task = raw["task"]
-        self.task_description = raw["prompt"]
+        self._task, self._episode, self._prompt = raw["task"], raw["episode"], raw["prompt"]
+        self._list = episode_list
         self._verdict = raw.get("verdict", {})
         self._scene = None
         if self._needs_state():
@@ -450,16 +489,51 @@ class SoftVTEnv(gymnasium.Env[Observation, np.ndarray]):
 
     def _warn_of_missing_limits(self) -> None:
         """Warns once of a soft object without a limit, whose deformation has no cost and is never safe."""
-        if self._has_warned or not (self._has_cost or self._reward == "safety"):
+        if not (self._has_cost or self._reward == "safety"):
             return
         judged = [self._verdict, *self._verdict.get("targets", ())]
         if any(one.get("d_peak") is not None and one.get("tau") is None for one in judged):
-            self._has_warned = True
-            warnings.warn(
-                f"suite {self._suite}, task {self.task}: an object of the goal has no limit τ, so that no episode is safe and no deformation "
-                "costs; calibrate it (docs/calibration.md)",
-                stacklevel=2,
+            self._warn_once(
+                f"suite {self._suite}, task {self.task}",
+                "an object of the goal has no limit τ, so that no episode is safe and no deformation costs; calibrate it (docs/calibration.md)",
             )
+
+    def _warn_of_left_episode(self) -> None:
+        """Warns once of an episode of a recorded run that is left before its end, of which the server says nothing here."""
+        if self._is_open:
+            self._is_open = False
+            self._warn_once(
+                f"suite {self._suite}, task {self.task}, episode {self._episode}",
+                "left before its end, so that --out has no record of this attempt, and takes no later one. The server ends an episode at the goal "
+                "or with the budget of its task; max_episode_steps ends it earlier",
+            )
+
+    def _warn_of_other_episode(self) -> None:
+        """Warns once of an episode that a recorded run does not have, in the run's list."""
+        if self._run_episodes <= self._episode and self._run_episodes > 0 and self._list == self._list_of({}):
+            last = self._run_episodes - 1
+            self._warn_once(
+                f"suite {self._suite}",
+                f"the run of --out has the episodes 0 to {last} of each task, and no other one is recorded; a reset without a seed, also the "
+                f"automatic one of a vector, draws from 2³² episodes. Reset by seeds {self._first_seed} to {self._first_seed + last}, vectors with "
+                'autoreset_mode="Disabled" and reset_mask',
+            )
+
+    def _is_of_run(self) -> bool:
+        """True in an episode of the run that the server records."""
+        return self._episode < self._run_episodes and self._list == self._list_of({})
+
+    def _list_of(self, named: Mapping[str, Any]) -> tuple[int, str]:
+        """Seed and split of the list of episodes that a request or a state names; by default those of the server, which its run has."""
+        hello = self._client.hello
+        seed, split = (hello[key] if named.get(key) is None else named[key] for key in ("seed", "split"))
+        return seed, split
+
+    def _warn_once(self, what: str, words: str) -> None:
+        """Warns of something, unless the same words were a warning of this environment before."""
+        if words not in self._warned:
+            self._warned.add(words)
+            warnings.warn(f"{what}: {words}", stacklevel=2)
 
     def _needs_state(self) -> bool:
         return self._reward == "staged" or (self._parts is not None and "state" in self._parts)
@@ -556,6 +630,7 @@ class SoftVTEnv(gymnasium.Env[Observation, np.ndarray]):
         info.update(_counters(raw))
         # Not "episode", under which wrappers of Gymnasium and Stable-Baselines3 put their statistics.
         info["episode_index"] = raw["episode"]
+        info["split"] = self._list[1]
         info["prompt"] = self.task_description
         # Vector environments make an array of Python's bool only.
         info["is_success"] = bool(raw["success"])

@@ -109,12 +109,29 @@ class SoftVTVectorEnv(VectorEnv):
             infos = self._add_info(infos, info, index)
         return self._batch(), rewards, terminated, truncated, infos
 
+    def set_state(self, states: Sequence[dict[str, Any]]) -> tuple[Any, dict[str, Any]]:
+        """Restores a state of each environment, of `call("get_state")`, also after the end of its episode; returns what `reset` does."""
+        if not isinstance(states, Sequence) or len(states) != self.num_envs:
+            found = f"{len(states)} states" if isinstance(states, Sequence) else f"a {type(states).__name__}"
+            raise ValueError(f"set_state: {found} for {self.num_envs} environments; give a list of one state for each")
+        infos: dict[str, Any] = {}
+        for index, (env, state) in enumerate(zip(self.envs, states)):
+            self._observations[index], info = env.set_state(state)
+            self._steps[index] = 0
+            # A state may be that of the end.
+            self._ended[index] = "record" in info
+            infos = self._add_info(infos, info, index)
+        return self._batch(), infos
+
     def render(self) -> tuple[Any, ...] | None:
         """Images of all environments."""
         return None if self.render_mode is None else self.call("render")
 
     def call(self, name: str, *arguments: Any, **named: Any) -> tuple[Any, ...]:
-        """Calls a method of each environment, or reads an attribute."""
+        """Calls a method of each environment, or reads an attribute. Raises ValueError for the methods that the vector has itself, since it keeps
+        count of the episodes."""
+        if name in ("reset", "step", "set_state"):
+            raise ValueError(f"call: {name!r} of single environments leaves the vector behind; call {name} of the vector itself")
         found = [getattr(env, name) for env in self.envs]
         return tuple(value(*arguments, **named) if callable(value) else value for value in found)
 

@@ -1,5 +1,6 @@
 """Environments: Gymnasium's checker, observations, rewards, info, episodes and states."""
 
+import copy
 import os
 import pickle
 import unittest
@@ -72,6 +73,7 @@ class Environments(unittest.TestCase):
     def test_flags_may_replace_arguments_that_are_not_given(self):
         env = self.make(obs="proprio", flags=("--split", "experiment", "--gripper", "binary", "--privileged"))
         self.assertEqual([env.hello[key] for key in ("split", "gripper", "pose", "privileged")], ["experiment", "binary", "delta", True])
+        self.assertEqual(env.reset(seed=1000)[1]["split"], "experiment")
 
     def test_impossible_tasks_suites_and_parts_are_refused(self):
         for arguments, words in [
@@ -135,7 +137,11 @@ class Environments(unittest.TestCase):
         self.assertEqual(info["episode_index"], 2**32 - 1000)
         episodes = [[env.reset(seed=7)[1]["episode_index"], env.reset()[1]["episode_index"]] for _ in range(2)]
         self.assertEqual(episodes[0], episodes[1], "the episode after a seed is drawn from it")
-        self.assertFalse(same(env.reset(options={"episode": 3, "split": "demonstration"})[0], first))
+        other, info = env.reset(options={"episode": 3, "split": "demonstration"})
+        self.assertEqual((same(other, first), info["split"]), (False, "demonstration"))
+        kept = env.get_state()
+        self.assertEqual(env.reset(seed=1003)[1]["split"], "validation")
+        self.assertEqual(env.set_state(kept)[1]["split"], "demonstration")
         with self.assertRaisesRegex(ValueError, "'episodes'; expected task, episode, split or seed"):
             env.reset(options={"episodes": 3})
         with self.assertRaisesRegex(ValueError, "seed=1003 is episode 3, and options name episode 7; leave out one of them"):
@@ -187,6 +193,37 @@ class Environments(unittest.TestCase):
             self.assertTrue(same(observation, once[4]))
             self.assertEqual(info["step"], 4)
             self.assertTrue(same(restored.step(actions[4])[0], once[5]))
+
+    def test_a_state_is_restored_after_the_end_and_may_be_that_of_the_end(self):
+        for freeze in (False, True):
+            env = self.make(obs="proprio", freeze=freeze)
+            env.reset(seed=1000)
+            env.step(np.tile(HOLD, (4, 1)))
+            middle = env.get_state()
+            last = env.step(np.tile(HOLD, (STEPS - 4, 1)))
+            end = env.get_state()
+            self.assertEqual(env.set_state(middle)[1]["step"], 4)
+            self.assertEqual(env.step(HOLD)[4]["step"], 5)
+            self.assertEqual(judged(env.set_state(end)[1]["record"]), judged(last[4]["record"]))
+            if freeze:
+                self.assertEqual(env.step(HOLD)[1:4], (0.0, False, True))
+            else:
+                with self.assertRaisesRegex(softvt.ServerError, "the episode is over"):
+                    env.step(HOLD)
+
+    def test_the_task_is_chosen_by_arguments_and_options_alone(self):
+        env = self.make(obs="proprio", task=3)
+        for name in ("task", "task_description"):
+            with self.assertRaises(AttributeError):
+                setattr(env, name, 0)
+        env.reset(seed=1000)
+        self.assertEqual((env.task, env.reset(options={"task": 5})[1]["task"], env.task), (3, 5, 5))
+
+    def test_an_environment_cannot_be_pickled_or_copied(self):
+        env = self.make(obs="proprio")
+        for send in (pickle.dumps, copy.deepcopy):
+            with self.assertRaisesRegex(TypeError, "SoftVTEnv has a connection .* make it inside of the worker"):
+                send(env)
 
     def test_an_experts_actions_earn_each_reward_and_end_with_the_record_of_its_run(self):
         actions, record = expert_run()
@@ -473,7 +510,7 @@ class Environments(unittest.TestCase):
         self.assertFalse(env.hello["privileged"])
         _, info = env.reset(seed=1000)
         _, _, _, _, later = env.step(HOLD)
-        expected = {"task", "episode_index", "step", "time_s", "far_commands", "clamped_grips", "prompt", "is_success"}
+        expected = {"task", "episode_index", "step", "time_s", "far_commands", "clamped_grips", "split", "prompt", "is_success"}
         for one in (info, later):
             self.assertEqual(expected - set(one), set())
             # Servers may count more than that.
@@ -553,6 +590,34 @@ class Vectors(unittest.TestCase):
             envs.reset(options={"reset_mask": np.zeros(2, dtype=bool)})
         with self.assertRaisesRegex(ValueError, "expected a dict"):
             envs.reset(options=[1])
+
+    def test_a_vector_restores_states_also_after_the_end(self):
+        hold = np.zeros((2, 7), dtype=np.float32)
+        for mode in ("NextStep", "SameStep", "Disabled"):
+            envs = softvt.SoftVTVectorEnv(2, script=short_suite(), obs="proprio", autoreset_mode=mode)
+            self.addCleanup(envs.close)
+            envs.reset(seed=1000)
+            for _ in range(STEPS - 1):
+                before, *_ = envs.step(hold)
+            states = envs.call("get_state")
+            self.assertTrue(envs.step(hold)[3].all())
+            observation, info = envs.set_state(states)
+            self.assertTrue(same(observation, before))
+            self.assertEqual((info["step"].tolist(), info["episode_index"].tolist()), ([STEPS - 1] * 2, [0, 1]))
+            self.assertTrue(envs.step(hold)[3].all(), "the last step of the restored episodes")
+        for wrong, words in [(states[:1], "1 states for 2 environments"), (states[0], "a dict for 2 environments; give a list")]:
+            with self.assertRaisesRegex(ValueError, words):
+                envs.set_state(wrong)
+        with self.assertRaisesRegex(ValueError, "call: 'set_state' .*; call set_state of the vector itself"):
+            envs.call("set_state", states)
+        # The state of an end is one: the next step resets it.
+        envs = softvt.SoftVTVectorEnv(1, script=short_suite(), obs="proprio")
+        self.addCleanup(envs.close)
+        envs.reset(seed=1000)
+        for _ in range(STEPS):
+            envs.step(hold[:1])
+        envs.set_state(envs.call("get_state"))
+        self.assertEqual(envs.step(hold[:1])[4]["step"].tolist(), [0])
 
     def test_an_action_that_is_refused_leaves_the_other_environments_as_they_are(self):
         envs = softvt.SoftVTVectorEnv(2, script=short_suite(), obs="proprio")

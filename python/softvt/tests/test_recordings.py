@@ -5,10 +5,12 @@ import pickle
 import shutil
 import subprocess
 import unittest
+import warnings
 
+import gymnasium
 import numpy as np
 import softvt
-from suites_for_tests import FOLDER, expert_run, recording
+from suites_for_tests import FOLDER, STEPS, expert_run, recording, short_suite
 
 
 class Runs(unittest.TestCase):
@@ -33,6 +35,48 @@ class Runs(unittest.TestCase):
         self.assertEqual(recorded, record)
         for command in (["replay", str(out), "0/0"], ["report", str(out), "--out", str(FOLDER / "report")]):
             subprocess.run([softvt.find_binary(), *command], check=True, stdout=subprocess.DEVNULL)
+
+    def test_episodes_that_a_run_does_not_record_are_warnings(self):
+        flags = ("--episodes", "2", "--out", str(FOLDER / "left"))
+        arguments = {"obs": "proprio", "cost": False, "flags": flags}
+        hold = np.zeros(7)
+        left = r"task 0, episode 0: left before its end, so that --out has no record .*; max_episode_steps ends it earlier"
+        env = gymnasium.make("softvt/File-v0", script=short_suite(), max_episode_steps=3, **arguments)
+        try:
+            env.reset(seed=1000)
+            for _ in range(3):
+                *_, truncated, info = env.step(hold)
+            self.assertTrue(truncated and "recorded" not in info)
+            with self.assertWarnsRegex(UserWarning, left):
+                env.reset(seed=1001)
+            with warnings.catch_warnings():
+                warnings.simplefilter("error")
+                # Only once; nothing was begun, and training is not of the run.
+                env.step(hold)
+                env.reset(seed=1001)
+                env.reset(options={"split": "demonstration"})
+                env.step(hold)
+                env.reset(options={"episode": 9, "seed": 7})
+            with self.assertWarnsRegex(UserWarning, "has the episodes 0 to 1 of each task, .* Reset by seeds 1000 to 1001"):
+                env.reset()
+        finally:
+            env.close()
+        # Every episode of a run, in a vector.
+        out = FOLDER / "vector"
+        arguments["flags"] = ("--episodes", "2", "--task", "0", "--out", str(out))
+        envs = softvt.SoftVTVectorEnv(2, script=short_suite(), autoreset_mode="Disabled", **arguments)
+        try:
+            with warnings.catch_warnings():
+                warnings.simplefilter("error")
+                envs.reset(seed=1000)
+                for _ in range(STEPS):
+                    *_, infos = envs.step(np.zeros((2, 7)))
+            self.assertEqual(infos["recorded"].tolist(), [True, True])
+            with self.assertWarnsRegex(UserWarning, "autoreset_mode"):
+                envs.reset()
+        finally:
+            envs.close()
+        self.assertEqual(len((out / "episodes.jsonl").read_text().splitlines()), 2)
 
 
 class Datasets(unittest.TestCase):
