@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .arguments import require_one_of, texts, whole_number
+from .arguments import require_bool, require_one_of, texts, whole_number
 
 if TYPE_CHECKING:
     import h5py
@@ -40,6 +40,8 @@ class Demonstration:
     prompt: str
     attempt: int
     """Episode of the demonstration split in which it was recorded."""
+    safe: bool
+    """Whether the evaluator judged it safe. Recordings made with `--keep goal` have others too."""
 
 
 class Dataset:
@@ -67,6 +69,7 @@ class Dataset:
         control: str = "pose",
         gripper: str | None = None,
         task: int | Sequence[int] | None = None,
+        safe: bool = False,
     ):
         """Opens a recording.
 
@@ -77,12 +80,14 @@ class Dataset:
         control: motion of the actions, "pose" or "joints".
         gripper: grip code of the actions; by default that of the recording, as of its exports.
         task: only these tasks.
+        safe: True for the safe demonstrations only. By default all that were kept, which are safe unless they were recorded with `--keep goal`.
 
-        Raises ValueError if there is no such stream, or no demonstration of one of the tasks, and ImportError without h5py.
+        Raises ValueError if there is no such stream, no demonstration of one of the tasks, or no safe one, and ImportError without h5py.
         """
         if gripper is not None:
             require_one_of("gripper", gripper, [*ACTIONS])
         require_one_of("control", control, ("pose", "joints"))
+        require_bool("safe", safe)
         horizon = whole_number("horizon", horizon, 1)
         keys = texts("keys", keys)
         if not isinstance(path, str | os.PathLike):
@@ -100,7 +105,10 @@ class Dataset:
         known = {demo.task for demo in recorded}
         if tasks is not None and (missing := tasks - known):
             raise ValueError(f"{path}: no demonstration of task {_listed(missing)}; the recording has those of task {_listed(known)}")
-        self.demonstrations = [demo for demo in recorded if tasks is None or demo.task in tasks]
+        chosen = [demo for demo in recorded if tasks is None or demo.task in tasks]
+        self.demonstrations = [demo for demo in chosen if demo.safe or not safe]
+        if not self.demonstrations:
+            raise ValueError(f"{path}: safe=True: none of the {len(chosen)} demonstrations is safe; leave it out")
         self._starts = np.cumsum([0, *(demo.steps for demo in self.demonstrations)])
 
     def __len__(self) -> int:
@@ -164,11 +172,20 @@ class Dataset:
                     folder = folder if folder in group else "obs"
                     have = ", ".join(sorted(group[folder]))
                     raise ValueError(f"{file}: data/{name} has no stream {stream}; {folder} has {have}")
+                if below := _streams_below(group, stream):
+                    raise ValueError(f"{file}: data/{name}/{stream} is a group; give one of its streams: {', '.join(below)}")
             text = {key: _text(attrs[key]) for key in ("task_suite", "language")}
-            numbers = {key: int(attrs[key]) for key in ("num_samples", "task_id", "attempt")}
+            numbers = {key: int(attrs[key]) for key in ("num_samples", "task_id", "attempt", "success")}
             found.append(
                 Demonstration(
-                    file, name, numbers["num_samples"], text["task_suite"], numbers["task_id"], text["language"], numbers["attempt"]
+                    file,
+                    name,
+                    numbers["num_samples"],
+                    text["task_suite"],
+                    numbers["task_id"],
+                    text["language"],
+                    numbers["attempt"],
+                    bool(numbers["success"]),
                 )
             )
         return found
@@ -218,10 +235,23 @@ def _recorded_gripper(file: Path) -> str:
     for folder in file.resolve().parents[:2]:
         card = folder / "dataset.json"
         if card.is_file():
-            gripper = json.loads(card.read_text(encoding="utf-8")).get("gripper") or "continuous"
+            try:
+                gripper = json.loads(card.read_text(encoding="utf-8")).get("gripper") or "continuous"
+            except (ValueError, AttributeError) as error:
+                raise ValueError(f"{card}: not the file that softvt record wrote: {error}; give gripper to do without it") from error
             require_one_of(f"{card}: gripper", gripper, [*ACTIONS])
             return str(gripper)
     return "continuous"
+
+
+def _streams_below(demo: Any, name: str) -> list[str]:
+    """Paths in the group of a demonstration of the streams below a name; none for a stream."""
+    import h5py
+
+    found: list[str] = []
+    if isinstance(demo[name], h5py.Group):
+        demo[name].visititems(lambda _, item: found.append(item.name) if isinstance(item, h5py.Dataset) else None)
+    return sorted(path.removeprefix(f"{demo.name}/") for path in found)
 
 
 def _manifest_files(manifest: Path) -> set[str]:

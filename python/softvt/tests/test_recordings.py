@@ -8,6 +8,7 @@ import unittest
 import warnings
 
 import gymnasium
+import h5py
 import numpy as np
 import softvt
 from suites_for_tests import FOLDER, STEPS, expert_run, recording, short_suite
@@ -153,6 +154,29 @@ class Datasets(unittest.TestCase):
         np.testing.assert_array_equal(grips(self.folder), grips(folder, gripper="continuous"))
         self.assertFalse(np.array_equal(grips(self.folder), forces))
 
+    def test_a_card_that_is_no_json_is_named(self):
+        folder = FOLDER / "card"
+        shutil.copytree(self.folder, folder)
+        for text in ("{", "[]"):
+            (folder / "dataset.json").write_text(text)
+            with self.assertRaisesRegex(ValueError, "card/dataset.json: not the file that softvt record wrote: .*; give gripper"):
+                softvt.Dataset(folder)
+            self.assertEqual(len(softvt.Dataset(folder, gripper="continuous").demonstrations), 2)
+
+    def test_unsafe_demonstrations_can_be_left_out(self):
+        folder = FOLDER / "unsafe"
+        shutil.copytree(self.folder, folder)
+        self.assertEqual([demo.safe for demo in softvt.Dataset(folder, safe=True).demonstrations], [True, True])
+        for number, file in enumerate(sorted((folder / "hdf5").iterdir())):
+            # As with --keep goal.
+            with h5py.File(file, "r+") as opened:
+                opened["data/demo_0"].attrs["success"] = 0
+            self.assertEqual([demo.safe for demo in softvt.Dataset(folder).demonstrations], [False, number == 0])
+            if number == 0:
+                self.assertEqual([demo.task for demo in softvt.Dataset(folder, safe=True).demonstrations], [1])
+        with self.assertRaisesRegex(ValueError, "safe=True: none of the 2 demonstrations is safe"):
+            softvt.Dataset(folder, safe=True)
+
     def test_a_data_set_can_be_sent_to_a_worker(self):
         data = softvt.Dataset(self.folder)
         self.assertEqual(pickle.loads(pickle.dumps(data))[3]["step"], data[3]["step"])
@@ -186,6 +210,11 @@ class Datasets(unittest.TestCase):
             ({"path": self.folder, "keys": "state"}, r'keys=\'state\': expected a list; write keys=\("state",\)'),
             ({"path": self.folder, "keys": ("actions",)}, "'actions' is no observation"),
             ({"path": self.folder, "keys": ("privileged/nope",)}, "no stream privileged/nope; privileged has actions_with_force"),
+            (
+                {"path": self.folder, "keys": ("privileged/states",)},
+                "data/demo_0/privileged/states is a group; give one of its streams: privileged/states/rigid_object/alphabet_soup/root_pose_w, ",
+            ),
+            ({"path": self.folder, "safe": "yes"}, "safe='yes': expected True or False"),
             ({"path": self.folder, "task": "0"}, "task='0': expected a number or a list of numbers"),
             ({"path": self.folder, "task": []}, "no number in the list"),
             ({"path": None}, "path=None: expected the path of a recording"),
