@@ -1,6 +1,6 @@
 """softvt as a benchmark of vla-eval: `benchmark: "softvt.vla_eval:SoftVTBenchmark"` in its configuration. docs/vla-eval.md is the guide."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -25,6 +25,7 @@ from .profile import CONTROLS, GRIPPERS, action_size, proprio_parts
 
 # Names of the cameras in observations, as `softvt --protocol vla-eval` has them.
 _CAMERAS = {"third_person": "agentview", "wrist": "wrist"}
+_MAX_VALUE_CHARS = 300
 
 
 class SoftVTBenchmark(StepBenchmark):
@@ -104,8 +105,9 @@ class SoftVTBenchmark(StepBenchmark):
         return observation
 
     def step(self, action: Action) -> StepResult:
-        """Executes `action["actions"]`, of 7 numbers, or 8 with control="joints". Raises ValueError for another length."""
-        numbers = np.asarray(action["actions"], dtype=np.float64).reshape(-1)
+        """Executes `action["actions"]`, of 7 numbers, or 8 with control="joints". Raises ValueError for another length, and for an answer without
+        numbers."""
+        numbers = _numbers(action)
         size = action_size(self.control)
         if numbers.shape != (size,):
             motion = "joint positions" if self.control == "joints" else "position, axis-angle"
@@ -184,7 +186,7 @@ class SoftVTBenchmark(StepBenchmark):
             size = action_size(self.control) - 1
             arm = np.zeros(size) if self._last_result.obs is None else self._last_result.obs["proprio"][:size]
             return {"actions": np.append(arm, 0.0).astype(np.float32)}
-        grip = -1.0 if last_action is None else np.asarray(last_action["actions"]).reshape(-1)[-1]
+        grip = -1.0 if last_action is None else _numbers(last_action)[-1]
         return {"actions": np.append(np.zeros(6), grip).astype(np.float32)}
 
     def render(self) -> np.ndarray | None:
@@ -207,3 +209,22 @@ class SoftVTBenchmark(StepBenchmark):
                 raise ValueError(f"suite={self.suite!r} has the suites {', '.join(names)}, and a benchmark has one: give one of them")
             self._env = env
         return self._env
+
+
+def _numbers(action: Action) -> np.ndarray:
+    """The numbers of a model server's answer, in one row. Raises ValueError for an answer that is an error or has no numbers."""
+    fix = "a model server of vla-eval answers {'actions': …}, an array of numbers"
+    if not isinstance(action, Mapping):
+        raise ValueError(f"the answer is {_shortened(action)}; {fix}")
+    if action.get("actions") is None:
+        found = ", ".join(f"{key!r}: {_shortened(value)}" for key, value in action.items())
+        raise ValueError(f"the answer has no 'actions', but {{{found}}}; {fix}")
+    try:
+        return np.asarray(action["actions"], dtype=np.float64).reshape(-1)
+    except (TypeError, ValueError):
+        raise ValueError(f"the answer has 'actions': {_shortened(action['actions'])}; {fix}") from None
+
+
+def _shortened(value: object) -> str:
+    text = repr(value)
+    return text if len(text) <= _MAX_VALUE_CHARS else text[:_MAX_VALUE_CHARS] + "…"

@@ -101,6 +101,19 @@ class Benchmarks(unittest.TestCase):
         with self.assertRaisesRegex(ValueError, "8 numbers"):
             pose.step({"actions": np.zeros(8)})
 
+    def test_an_answer_that_is_no_action_is_quoted_with_the_form_of_one(self):
+        benchmark = SoftVTBenchmark(short_suite())
+        for action, words in [
+            ({"error": "CUDA out of memory"}, "no 'actions', but {'error': 'CUDA out of memory'}; a model server of vla-eval answers"),
+            ({"action": [0, 1]}, r"no 'actions', but {'action': \[0, 1\]}"),
+            ({"actions": {"x": 1}}, "the answer has 'actions': {'x': 1}; a model server"),
+            ({"actions": ["a"] * 200}, "…; a model server"),
+            ({"actions": None}, "no 'actions', but {'actions': None}"),
+            ([0.0] * 7, r"the answer is \[0.0, "),
+        ]:
+            with self.subTest(action), self.assertRaisesRegex(ValueError, words):
+                benchmark.step(action)
+
     def test_the_ratio_is_that_of_the_object_for_which_it_is_largest(self):
         verdict = {"goal": True, "safety": False, "no_drop": True, "d_peak": 0.2, "tau": 0.4}
         rigid, crushed = {"d_peak": None, "tau": None}, {"d_peak": 3.0, "tau": 0.5}
