@@ -11,6 +11,7 @@ import gymnasium
 import h5py
 import numpy as np
 import softvt
+from softvt import serve
 from suites_for_tests import FOLDER, STEPS, expert_run, recording, short_suite
 
 
@@ -64,7 +65,7 @@ class Runs(unittest.TestCase):
             env.close()
         # Every episode of a run, in a vector.
         out = FOLDER / "vector"
-        arguments["flags"] = ("--episodes", "2", "--task", "0", "--out", str(out))
+        arguments["flags"] = ("--episodes", "2", "--task", "0", f"--out={out}")
         envs = softvt.SoftVTVectorEnv(2, script=short_suite(), autoreset_mode="Disabled", **arguments)
         try:
             with warnings.catch_warnings():
@@ -76,7 +77,9 @@ class Runs(unittest.TestCase):
             with self.assertWarnsRegex(UserWarning, "autoreset_mode"):
                 envs.reset()
         finally:
+            url = envs.envs[0]._client.url
             envs.close()
+        self.assertNotIn(url, [server.url for server in serve._running], "a server that records ends at once")
         self.assertEqual(len((out / "episodes.jsonl").read_text().splitlines()), 2)
 
 
