@@ -141,8 +141,8 @@ class SoftVTEnv(gymnasium.Env[Observation, np.ndarray]):
         ):
             if value is not None:
                 require_one_of(name, value, known)
-        for name, value in (("cost", cost), ("privileged", privileged), ("freeze", freeze)):
-            require_bool(name, value)
+        for name, switch in (("cost", cost), ("privileged", privileged), ("freeze", freeze)):
+            require_bool(name, switch)
         for name, text in (("url", url), ("token", token), ("camera", camera)):
             if text is not None:
                 require_text(name, text)
@@ -264,7 +264,7 @@ class SoftVTEnv(gymnasium.Env[Observation, np.ndarray]):
         self._prompts = {entry["task"]: entry["prompt"] for entry in suites[name]["tasks"]}
         self._tasks = _tasks(name, task, self._prompts)
         self._task = self._tasks[0]
-        self._prompt = self._prompts[self._task]
+        self._prompt: str = self._prompts[self._task]
         budgets = {entry["task"]: entry["budget_steps"] for entry in suites[name]["tasks"]}
         # The name under which Gymnasium's TimeLimit has it, and under which LeRobot asks for it.
         self._max_episode_steps = max(budgets[task] for task in self._tasks)
