@@ -49,6 +49,7 @@ mod plausibility;
 mod scale;
 mod variation;
 mod visual;
+mod visual_warnings;
 
 use std::sync::Arc;
 

@@ -18,8 +18,14 @@ const MAX_DENSITY: f64 = 23_000.0;
 const MAX_SAG: f64 = 0.15;
 
 impl Asset {
-    /// Warnings about its material, one sentence each.
+    /// Warnings about its materials and visuals, one sentence each.
     pub fn warnings(&self) -> Vec<String> {
+        let mut warnings = self.material_warnings();
+        warnings.extend(self.visual_warnings());
+        warnings
+    }
+
+    fn material_warnings(&self) -> Vec<String> {
         match &self.body {
             Body::Soft(SoftMaterial { elastic, collapse_strain, damage_strain, .. }) => {
                 let units = [

@@ -232,6 +232,13 @@ fn datasets_are_checked_and_reproduced() {
             && one.contains("the manifest says \"now ")),
         "{problems:?}"
     );
+    project
+        .write("a/manifest.jsonl", manifest.replacen("\"success\":true", "\"success\":false", 1).as_bytes());
+    let problems = check::folder(&a, check::CheckScope::Whole).expect("a dataset").problems;
+    assert!(
+        matches!(&problems[..], [one] if one.contains("attribute metadata_json: safety is true, the manifest says false")),
+        "{problems:?}"
+    );
     project.write("a/manifest.jsonl", manifest.as_bytes());
     project.write("a/videos/one_task0/demo_0_eye_in_hand_rgb.mp4", b"not a video");
     let whole = fs::read(&hdf5).expect("read");

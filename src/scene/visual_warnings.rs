@@ -1,0 +1,168 @@
+//! Visuals that are valid and cannot be seen.
+
+use super::{
+    Asset, Body,
+    decal::TextDecal,
+    visual::{Mask, Visual},
+};
+use softvt_common::text::format_number;
+use softvt_geometry::{Aabb, Vec3};
+
+impl Asset {
+    /// Warnings about visuals and layers that are nowhere on its surface, or that of its parts.
+    pub(super) fn visual_warnings(&self) -> Vec<String> {
+        let mut warnings = self.own_visual_warnings();
+        if let Body::Articulated(parts) = &self.body {
+            for part in parts {
+                let of_part = part.asset.own_visual_warnings();
+                warnings.extend(of_part.into_iter().map(|warning| format!("part {}: {warning}", part.name)));
+            }
+        }
+        warnings
+    }
+
+    fn own_visual_warnings(&self) -> Vec<String> {
+        let materials = usize::from(self.shape.highest_material()) + 1;
+        let unpainted = (materials..self.visuals.len()).map(|index| {
+            format!(
+                "visuals[{}]: no part of its shape is painted with material {index}; paint it: \
+                 shape:paint {{ material = {index}, … }}",
+                index + 1
+            )
+        });
+        let bounds = self.shape.loose_bounds();
+        let hidden = self.visuals.iter().enumerate().flat_map(|(index, visual)| {
+            let found = hidden_layers(visual, &bounds);
+            found.into_iter().map(move |warning| format!("visuals[{}].{warning}", index + 1))
+        });
+        unpainted.chain(hidden).collect()
+    }
+}
+
+fn hidden_layers(visual: &Visual, bounds: &Aabb) -> Vec<String> {
+    let found = visual.layers.iter().enumerate().filter_map(|(index, layer)| {
+        Some(format!("layers[{}]: {}; lengths are in metres", index + 1, misplaced(&layer.mask, bounds)?))
+    });
+    found.collect()
+}
+
+/// What is wrong with a mask that is the same on all of a shape within `bounds`, though it is made of a place.
+fn misplaced(mask: &Mask, bounds: &Aabb) -> Option<String> {
+    match mask {
+        Mask::Inverse { mask } => misplaced(mask, bounds),
+        Mask::Product { masks } => masks.iter().find_map(|mask| misplaced(mask, bounds)),
+        Mask::Gradient { axis, from_m, to_m } => {
+            let [low, high] = extent(bounds, &Vec3::from(*axis).normalize());
+            (from_m.max(*to_m) < low || from_m.min(*to_m) > high).then(|| {
+                format!(
+                    "its gradient, from {} to {} m, lies outside of the shape, which reaches from {} to {} m along its axis",
+                    format_number(*from_m),
+                    format_number(*to_m),
+                    format_number(low),
+                    format_number(high)
+                )
+            })
+        }
+        Mask::Inside { shape, soft_m } => {
+            let is_apart = !shape.loose_bounds().loosened(*soft_m).intersects(bounds);
+            is_apart.then(|| "the shape of its mask lies outside of the shape".to_owned())
+        }
+        Mask::Text { decal } => (!meets(decal, bounds)).then(|| {
+            let [x, y, z] = decal.line.at.map(format_number);
+            format!("its text, at ({x}, {y}, {z}) m, is printed beside the shape")
+        }),
+        _ => None,
+    }
+}
+
+/// Lowest and highest coordinate of a box along an axis.
+fn extent(bounds: &Aabb, axis: &Vec3) -> [f64; 2] {
+    let (centre, reach) = (bounds.centre().dot(axis), 0.5 * bounds.size().dot(&axis.abs()));
+    [centre - reach, centre + reach]
+}
+
+/// True if a line of text may be on the surface of a shape within `bounds`.
+fn meets(decal: &TextDecal, bounds: &Aabb) -> bool {
+    let line = &decal.line;
+    let (at, facing) = (Vec3::from(line.at), Vec3::from(line.facing).normalize());
+    // Letters are hardly wider than high.
+    let reach = line.height_m * (1.0 + 0.5 * line.text.chars().count() as f64);
+    let offset = at - bounds.centre();
+    if line.wrap_m.is_some() {
+        return offset.z.abs() <= 0.5 * bounds.size().z + reach;
+    }
+    // As seen by the reader; the circle about the box is larger than its outline.
+    (offset - offset.dot(&facing) * facing).norm() <= 0.5 * bounds.size().norm() + reach
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{LabelLine, Typeface, VisualLayer};
+    use softvt_geometry::shape::Shape;
+    use softvt_physics::contact::Friction;
+    use std::sync::Arc;
+
+    fn warnings(mask: Mask) -> Vec<String> {
+        let layer = VisualLayer { mask, albedo: [1.0; 3], roughness: 0.5, opacity: 1.0, relief_m: 0.0 };
+        let asset = Asset {
+            name: "bun".into(),
+            shape: Shape::Box { half: Vec3::new(0.02, 0.03, 0.04) },
+            body: Body::Static,
+            friction: Friction::default(),
+            visuals: vec![Visual::default().with(layer)],
+            hints: Default::default(),
+        };
+        asset.visual_warnings()
+    }
+
+    fn text(at: [f64; 3], wrap_m: Option<f64>) -> Mask {
+        let line = LabelLine {
+            text: "milk".into(),
+            typeface: Typeface::Sans,
+            height_m: 0.01,
+            weight: 0.1,
+            at,
+            facing: [0.0, -1.0, 0.0],
+            turn: 0.0,
+            wrap_m,
+        };
+        Mask::Text { decal: Arc::new(TextDecal::new(line)) }
+    }
+
+    #[test]
+    fn layers_beside_the_shape_are_doubted() {
+        let gradient = |from_m, to_m| Mask::Gradient { axis: [0.0, 0.0, 2.0], from_m, to_m };
+        assert_eq!(warnings(gradient(0.03, -0.01)), [""; 0]);
+        assert_eq!(
+            warnings(Mask::Product { masks: vec![Arc::new(Mask::Whole), Arc::new(gradient(5.0, 30.0))] }),
+            [
+                "visuals[1].layers[1]: its gradient, from 5 to 30 m, lies outside of the shape, which reaches from -0.04 to 0.04 m \
+              along its axis; lengths are in metres"
+            ]
+        );
+        assert_eq!(warnings(text([0.0, 0.5, 0.03], None)), [""; 0], "printed along its direction");
+        assert_eq!(warnings(text([0.0, 0.0, 3.0], None)).len(), 1);
+        assert_eq!(warnings(text([0.5, 0.0, 0.0], Some(0.02))), [""; 0], "wrapped around the axis");
+        assert_eq!(warnings(text([0.0, 0.0, 0.3], Some(0.02))).len(), 1);
+        let ball = Arc::new(Shape::Sphere { radius: 0.01 }.translated(Vec3::new(0.0, 0.0, 0.4)));
+        assert_eq!(warnings(Mask::Inside { shape: ball, soft_m: 0.0 }).len(), 1);
+    }
+
+    #[test]
+    fn a_visual_without_a_painted_surface_is_doubted() {
+        let asset = Asset {
+            name: "bun".into(),
+            shape: Shape::Sphere { radius: 0.02 },
+            body: Body::Static,
+            friction: Friction::default(),
+            visuals: vec![Visual::default(); 2],
+            hints: Default::default(),
+        };
+        let found = asset.visual_warnings();
+        assert!(
+            found.len() == 1 && found[0].starts_with("visuals[2]: no part of its shape is painted"),
+            "{found:?}"
+        );
+    }
+}
