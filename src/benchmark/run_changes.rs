@@ -1,6 +1,6 @@
 //! [`RunChanges`]: what a run changes of its suite.
 
-use serde::{Deserialize, Serialize};
+use serde::{Deserialize, Serialize, de::Error};
 use serde_json::{Value, json};
 use sha2::{Digest, Sha256};
 
@@ -36,6 +36,8 @@ pub enum Twin {
 }
 
 impl RunChanges {
+    const KEYS: [&'static str; 7] = ["arguments", "shifts", "set", "twin", "vary", "seed", "seed_hash"];
+
     /// Keys of `run.json` that hold what the changes amount to, whatever files and options state them. Runs that agree
     /// in them, in the version and in their files have the same conditions.
     pub const EFFECTS: [&'static str; 5] = ["twin", "variation", "shifts", "options", "settings"];
@@ -45,12 +47,32 @@ impl RunChanges {
     /// # Errors
     /// A key is missing, or has a value of another type.
     pub fn of_manifest(manifest: &Value) -> Result<Self, serde_json::Error> {
-        Self::deserialize(manifest)
+        Self::deserialize(manifest).map_err(|error| match Self::invalid_key(manifest) {
+            Some(key) => serde_json::Error::custom(format!("{key}: {error}")),
+            None => error,
+        })
+    }
+
+    /// The key of a `run.json` whose value is not valid.
+    fn invalid_key(manifest: &Value) -> Option<&'static str> {
+        let is_valid = |key: &str| {
+            let mut others = json!(Self::default());
+            others[key] = manifest[key].clone();
+            Self::deserialize(others).is_ok()
+        };
+        Self::KEYS.into_iter().find(|key| !manifest[key].is_null() && !is_valid(key))
     }
 
     /// True if soft objects are made rigid.
     pub fn is_rigid_twin(&self) -> bool {
         self.twin == Some(Twin::Rigid)
+    }
+
+    /// Name of a suite in results. It has a suffix if `vary` or the rigid twin changes the objects, whose places stay.
+    pub fn suite_name(&self, suite: &str) -> String {
+        let varied = if self.vary.is_some() { "_varied" } else { "" };
+        let twin = if self.is_rigid_twin() { "_rigid_twin" } else { "" };
+        format!("{suite}{varied}{twin}")
     }
 
     /// Shifts and settings as tables name them, such as `mass=2`; values have three digits.

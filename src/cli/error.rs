@@ -78,8 +78,8 @@ impl CliError {
 
     /// A result that is not the recorded one.
     pub(crate) fn other_result(message: impl std::fmt::Display) -> Self {
-        let remedy = "softvt doctor checks whether this machine computes the published results";
-        Self::new(Exit::Internal, format!("{message}; {remedy}"))
+        let cause = "the files were changed after the run, or this machine computes other results, which softvt doctor checks";
+        Self::new(Exit::Internal, format!("{message}; {cause}"))
     }
 
     pub(crate) fn interrupted(message: impl ToString) -> Self {

@@ -39,6 +39,10 @@ pub enum MeshError {
     NonManifold { edges: usize },
     #[error("the mesh encloses no volume; export a solid, not a sheet")]
     Flat,
+    #[error(
+        "closed pieces of the mesh overlap, so that their common part would count twice; join them (a boolean union), and export it again"
+    )]
+    Overlap,
 }
 
 impl Mesh {
@@ -94,6 +98,19 @@ impl Mesh {
             }
         }
         (out, kept)
+    }
+
+    /// Some of the triangles with their vertices, without texture coordinates.
+    pub(crate) fn part(&self, triangles: &[[u32; 3]]) -> Self {
+        let (mut renamed, mut vertices) = (BTreeMap::new(), Vec::new());
+        let mut rename = |v: u32| {
+            *renamed.entry(v).or_insert_with(|| {
+                vertices.push(self.vertices[v as usize]);
+                vertices.len() as u32 - 1
+            })
+        };
+        let triangles = triangles.iter().map(|t| t.map(&mut rename)).collect();
+        Self { vertices, triangles, uvs: Vec::new() }
     }
 
     /// Validates indices and coordinates.

@@ -13,6 +13,7 @@ pub mod import;
 mod linear_algebra;
 pub mod mass;
 pub mod mesh;
+mod mesh_overlap;
 mod parry;
 pub mod pieces;
 pub mod samples;

@@ -115,7 +115,8 @@ impl EpisodeRecord {
         ];
         for (low_name, low, high_name, high) in ordered {
             if let Some((low, high)) = low.zip(high).filter(|(low, high)| is_above(*low, *high)) {
-                return Err(format!("{low_name} {low} is above {high_name} {high}"));
+                let high = if high_name.parse() == Ok(high) { String::new() } else { format!(" {high}") };
+                return Err(format!("{low_name} {low} is above {high_name}{high}"));
             }
         }
         Ok(())
@@ -370,7 +371,8 @@ mod tests {
         assert!(refusal(&[("tau", Value::Null)]).contains("some of kappa, tau and d_ref are null"));
         assert!(refusal(&[("tau", json!(9.0))]).contains("tau is 9, and 0.5 of d_ref 2 is 1"));
         let swapped = [("kappa", json!(1.25)), ("collapsed_volume_pct", json!(0.5))];
-        assert!(refusal(&swapped).contains("kappa 1.25 is above 1"));
+        let refused = refusal(&swapped);
+        assert!(refused.contains("kappa 1.25 is above 1") && !refused.contains("above 1 1"), "{refused}");
         let at = json!([{ "kappa": 0.3, "tau_pct": 0.6, "deformation_ok": true, "safety": true }]);
         let kappas = refusal(&[("kappas", at), far]);
         assert!(kappas.contains("at kappa 0.3 deformation_ok is true"), "{kappas}");

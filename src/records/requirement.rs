@@ -99,7 +99,8 @@ impl FromStr for Requirement {
         };
         let value: Option<f64> = number.trim().parse().ok().filter(|value: &f64| value.is_finite());
         let value = value.ok_or_else(|| format!("expected a number after the sign, got {bound:?}"))?;
-        if metric.unit == Unit::Share && !(-1.0..=1.0).contains(&(factor * value)) {
+        let least = if metric.name == "gap" { -1.0 } else { 0.0 };
+        if metric.unit == Unit::Share && !(least..=1.0).contains(&(factor * value)) {
             return Err(format!("{name} is a share of 1, got {bound}; write 0.9 or 90%"));
         }
         Ok(Self { text: word.to_owned(), metric, comparison, bound: factor * value })
@@ -111,7 +112,11 @@ impl Requirement {
     pub fn unmet(&self, summary: &SuiteSummary) -> Option<String> {
         let (suite, text, name) = (&summary.suite, &self.text, self.metric.name);
         let Some(value) = (self.metric.value)(&summary.scores) else {
-            return Some(format!("{suite}: {text}: {name} is not defined for this suite"));
+            let cause = match summary.scores.episodes {
+                0 => "there is no episode".to_owned(),
+                _ => format!("{name} is not defined for this suite"),
+            };
+            return Some(format!("{suite}: {text}: {cause}"));
         };
         let is_met = (self.comparison.holds)(value, self.bound);
         (!is_met).then(|| format!("{suite}: {text} is not met: {name} is {value:.4}"))
@@ -153,7 +158,7 @@ mod tests {
         }
         assert!(unmet("safety>0.9", &nine).is_some_and(|m| m.contains("safety is 0.9000")));
         assert!(unmet("invalid>=1", &nine).is_some());
-        assert!(unmet("goal>=0.5", &summary(0, 0)).is_some_and(|m| m.contains("not defined")));
+        assert!(unmet("goal>=0.5", &summary(0, 0)).is_some_and(|m| m.contains("there is no episode")));
     }
 
     #[test]

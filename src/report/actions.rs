@@ -100,11 +100,11 @@ pub fn read(path: &Path) -> Result<Vec<Action>, ActionsError> {
     actions.ok_or(ActionsError::NotFinite { path })
 }
 
-/// Checks that the file of an episode below the run folder `dir` holds the actions of its record.
+/// Reads the actions of an episode below the run folder `dir`, which must be those of its record.
 ///
 /// # Errors
 /// The file is missing, cut or changed.
-pub fn verify(dir: &Path, record: &EpisodeRecord) -> Result<(), ActionsError> {
+pub fn read_checked(dir: &Path, record: &EpisodeRecord) -> Result<Vec<Action>, ActionsError> {
     let path = path(dir, record.header.id.index());
     let actions = read(&path)?;
     let (steps, path) = (record.stats.steps as usize, path.display().to_string());
@@ -112,7 +112,7 @@ pub fn verify(dir: &Path, record: &EpisodeRecord) -> Result<(), ActionsError> {
         return Err(ActionsError::Count { path, actions: actions.len(), steps });
     }
     match record.stats.actions_sha256 == checksum(&actions) {
-        true => Ok(()),
+        true => Ok(actions),
         false => Err(ActionsError::Checksum { path }),
     }
 }
@@ -130,10 +130,10 @@ mod tests {
         let mut record = sample_record();
         (record.stats.steps, record.stats.actions_sha256) = (3, checksum(&actions));
         let at = path(root.path(), record.header.id.index());
-        let problem = |record: &EpisodeRecord| verify(root.path(), record).unwrap_err().to_string();
+        let problem = |record: &EpisodeRecord| read_checked(root.path(), record).unwrap_err().to_string();
         assert!(problem(&record).contains("episode_00000.npy"), "a missing file is named");
         write(&at, &actions).unwrap();
-        verify(root.path(), &record).unwrap();
+        assert_eq!(read_checked(root.path(), &record).unwrap(), actions);
         let mut changed = actions;
         changed[1].grip = GripTarget::Closure(0.25);
         write(&at, &changed).unwrap();

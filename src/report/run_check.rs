@@ -1,12 +1,13 @@
-//! What the records of a run must agree with in its `run.json`: criteria, limits, and whether the policy saw the true
-//! state.
+//! What the records of a run must agree with in its `run.json`: suite, tasks and episodes, policy and seed, criteria and
+//! limits.
 //!
 //! A run whose files were changed consistently passes. Only `softvt replay`, which simulates its episodes again, proves
 //! a run.
 
-use serde_json::Value;
+use serde_json::{Value, json};
 
-use softvt_benchmark::CONTROL_DT;
+use softvt_benchmark::{CONTROL_DT, run_changes::RunChanges};
+use softvt_common::episode_id::{EpisodeId, EpisodeSplit};
 use softvt_evaluation::criteria::SuccessCriteria;
 use softvt_records::record::EpisodeRecord;
 
@@ -35,6 +36,9 @@ pub fn first_contradiction(manifest: &Value, records: &[EpisodeRecord]) -> Optio
 fn contradiction(manifest: &Value, record: &EpisodeRecord) -> Option<String> {
     let (v, s) = (&record.verdict, &record.stats);
     let is_valid = record.outcome.is_valid();
+    if let Some(what) = other_run(manifest, record) {
+        return Some(what);
+    }
     if let Some(privileged) =
         manifest["privileged"].as_bool().filter(|known| *known != record.header.privileged)
     {
@@ -70,6 +74,31 @@ fn contradiction(manifest: &Value, record: &EpisodeRecord) -> Option<String> {
     None
 }
 
+/// What of the header of a record is not that of its run.
+fn other_run(manifest: &Value, record: &EpisodeRecord) -> Option<String> {
+    let header = &record.header;
+    let EpisodeId { suite, task, episode, base_seed, split } = &header.id;
+    let changes = RunChanges::of_manifest(manifest).ok();
+    let of_run = changes.and_then(|changes| Some(changes.suite_name(manifest["suite"].as_str()?)));
+    if let Some(of_run) = of_run.filter(|name| name != suite) {
+        return Some(format!("suite is {suite:?}, and that of the run {of_run:?}"));
+    }
+    let fields = [("policy", json!(header.policy)), ("seed", json!(base_seed)), ("split", json!(split))];
+    let differs = |(name, own): &&(&str, Value)| !manifest[*name].is_null() && manifest[*name] != *own;
+    if let Some((name, own)) = fields.iter().find(differs) {
+        return Some(format!("{name} is {own}, and that of the run {}", manifest[*name]));
+    }
+    let lists = |field: &str, value: Value| manifest[field].as_array().is_none_or(|all| all.contains(&value));
+    let is_episode = match manifest["selected_episodes"].is_null() {
+        // A recording makes as many attempts as its demonstrations take.
+        true if *split == EpisodeSplit::Demonstration => true,
+        true => manifest["episodes"].as_u64().is_none_or(|count| u64::from(*episode) < count),
+        false => lists("selected_episodes", json!(episode)),
+    };
+    let index = header.id.index();
+    (!lists("tasks", json!(task)) || !is_episode).then(|| format!("the run does not have {index}"))
+}
+
 /// τ of the target's asset in the run. Instances with properties that do not show have limits of their own.
 fn nominal_tau(manifest: &Value, record: &EpisodeRecord) -> Option<f64> {
     let drawn = record.header.variation.iter().flat_map(|variation| variation.objects.values());
@@ -85,8 +114,6 @@ fn differ(a: f64, b: f64) -> bool {
 
 #[cfg(test)]
 mod tests {
-    use serde_json::json;
-
     use super::*;
     use crate::sample_record;
 
@@ -107,6 +134,27 @@ mod tests {
         });
         assert_eq!(contradiction(&manifest, &record), None);
         assert_eq!(contradiction(&json!({}), &record), None, "a manifest without settings");
+        let header = &record.header;
+        let of_run = json!({
+            "suite": header.id.suite, "policy": header.policy, "seed": header.id.base_seed, "split": header.id.split,
+            "tasks": [header.id.task], "episodes": header.id.episode + 1, "arguments": [], "shifts": [], "set": [],
+        });
+        assert_eq!(contradiction(&of_run, &record), None);
+        for (field, other) in
+            [("suite", json!("other")), ("policy", json!("mine")), ("seed", json!(5)), ("split", json!("x"))]
+        {
+            let mut changed = of_run.clone();
+            changed[field] = other;
+            let what = contradiction(&changed, &record).unwrap_or_default();
+            assert!(what.starts_with(&format!("{field} is ")), "{what}");
+        }
+        for (field, other) in [("tasks", json!([])), ("episodes", json!(0)), ("selected_episodes", json!([]))]
+        {
+            let mut changed = of_run.clone();
+            changed[field] = other;
+            let what = contradiction(&changed, &record).unwrap_or_default();
+            assert!(what.starts_with("the run does not have "), "{what}");
+        }
         let of = |change: &dyn Fn(&mut EpisodeRecord)| {
             let mut changed = record.clone();
             change(&mut changed);

@@ -129,7 +129,7 @@ impl<'a> MergedRun<'a> {
                     let other = other.dir.display().to_string();
                     return Err(MergeError::DuplicateEpisode { dir: dir(), episode, other });
                 }
-                actions::verify(&run.dir, record)?;
+                actions::read_checked(&run.dir, record)?;
             }
         }
         let tasks = manifest["tasks"].as_array().into_iter().flatten();

@@ -138,6 +138,11 @@ impl StoredRun {
         self.manifest["force_observed"].as_bool() == Some(true)
     }
 
+    /// The record of an episode.
+    pub fn record(&self, index: EpisodeIndex) -> Option<&EpisodeRecord> {
+        self.records.iter().find(|record| record.header.id.index() == index)
+    }
+
     /// Number of episodes of the complete run or shard.
     pub fn requested_episodes(&self) -> usize {
         let tasks = self.manifest["tasks"].as_array().map_or(0, Vec::len);
@@ -329,7 +334,7 @@ mod tests {
         let load_shard = |shard: Value| {
             let manifest = serde_json::json!({
                 "softvt": VERSION, "script": "x.lua", "suite": "suite", "policy": "expert", "tasks": [0], "episodes": 1,
-                "arguments": [], "shifts": [], "set": [], "seed": 0, "shard": shard,
+                "arguments": [], "shifts": [], "set": [], "seed": 11, "shard": shard,
             });
             files::write_json(&root.path().join(RUN), &manifest).unwrap();
             files::write_json_lines(&root.path().join(EPISODES), &[sample_record()]).unwrap();
@@ -349,7 +354,7 @@ mod tests {
         let root = tempfile::tempdir().unwrap();
         let manifest = serde_json::json!({
             "softvt": VERSION, "script": "x.lua", "suite": "suite", "policy": "expert", "tasks": [0], "episodes": 1,
-            "arguments": [], "shifts": [], "set": [], "seed": 0,
+            "arguments": [], "shifts": [], "set": [], "seed": 11,
         });
         files::write_json(&root.path().join(RUN), &manifest).unwrap();
         let lines = root.path().join(EPISODES);

@@ -16,7 +16,7 @@ use crate::{
     selection::{check_episodes, path_component, select_episodes, select_tasks},
     suite_run::{PreparedRun, SuiteRun},
 };
-use softvt_benchmark::{Condition, ObjectType, Plan, REFERENCE, Suite, Task, settings::Settings};
+use softvt_benchmark::{Condition, ObjectType, Plan, REFERENCE, ShiftValue, Suite, Task, settings::Settings};
 use softvt_common::{files::replace, text};
 use softvt_records::summary::method_label;
 use softvt_report::{
@@ -157,6 +157,7 @@ fn condition_cases(
                 condition.name
             )));
         }
+        check_shared_changes(config, condition)?;
         let mut changed = config.clone();
         changed.shifts.extend(condition.shift.iter().cloned());
         changed.settings.extend(condition.set.iter().cloned());
@@ -185,6 +186,23 @@ fn condition_cases(
         cases.push(ConditionCase { condition, folder, config: changed, not_applicable, is_neutral });
     }
     Ok(cases)
+}
+
+/// Checks that a condition sets nothing that the command line sets: it would hold in the reference alone.
+fn check_shared_changes(config: &RunConfig, condition: &Condition) -> Result<(), RunError> {
+    let refuse = |field: &'static str, change: String| {
+        let message = format!("the condition {:?} sets it as well; leave it out", condition.name);
+        Err(config.error_of(field, change, message))
+    };
+    let sets_shift = |shift: &&ShiftValue| condition.shift.iter().any(|own| own.name == shift.name);
+    if let Some(ShiftValue { name, value }) = config.shifts.iter().find(sets_shift) {
+        return refuse("shifts", format!("{name}={value}"));
+    }
+    let sets_setting = |(path, _): &&(String, String)| condition.set.iter().any(|(own, _)| own == path);
+    match config.settings.iter().find(sets_setting) {
+        Some((path, value)) => refuse("settings", format!("{path}={value}")),
+        None => Ok(()),
+    }
 }
 
 /// What the changes of a configuration make of a suite.

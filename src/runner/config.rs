@@ -314,11 +314,9 @@ impl RunConfig {
         }
     }
 
-    /// Name of a suite in results. It has a suffix if `vary` or the rigid twin changes the objects, whose places stay.
+    /// Name of a suite in results.
     pub fn suite_name(&self, suite: &Suite) -> String {
-        let varied = if self.vary.is_some() { "_varied" } else { "" };
-        let twin = if self.rigid_twin { "_rigid_twin" } else { "" };
-        format!("{}{varied}{twin}", suite.name)
+        self.changes().suite_name(&suite.name)
     }
 }
 

@@ -115,7 +115,7 @@ impl EpisodeArtifacts<'_> {
 
     /// True if the actions of a finished episode are those of its record.
     pub(crate) fn has_actions(&self, record: &EpisodeRecord) -> bool {
-        actions::verify(self.dir, record).is_ok()
+        actions::read_checked(self.dir, record).is_ok()
     }
 
     /// Writes all files that are not made of the states.

@@ -47,10 +47,7 @@ impl EpisodeSelector {
     pub fn find_record(self, stored: &StoredRun) -> Result<&EpisodeRecord, RunError> {
         let found = match self {
             Self::Line(line) => stored.records.get(line),
-            Self::Episode { task, episode } => {
-                let index = EpisodeIndex { task, episode };
-                stored.records.iter().find(|record| record.header.id.index() == index)
-            }
+            Self::Episode { task, episode } => stored.record(EpisodeIndex { task, episode }),
         };
         found.ok_or_else(|| {
             RunError::input(format!(

@@ -391,7 +391,7 @@ pub(crate) fn restore_artifacts(run: &PreparedRun, records: &[EpisodeRecord]) ->
     let has_actions = |record: &EpisodeRecord| artifacts.has_actions(record);
     for record in records {
         let path = actions::path(&run.out, record.header.id.index());
-        if let (true, Err(damage)) = (path.is_file(), actions::verify(&run.out, record)) {
+        if let (true, Err(damage)) = (path.is_file(), actions::read_checked(&run.out, record)) {
             run.config.notice(damage);
         }
     }
@@ -438,8 +438,7 @@ fn simulate_again(
     let Some(job) = run.jobs.find(index) else { return Ok(None) };
     let keep_states = artifacts.may_render(index.episode);
     let mut finished = if has_actions {
-        let path = actions::path(&run.out, index);
-        let recorded = actions::read(&path)?;
+        let recorded = actions::read_checked(&run.out, record)?;
         run.run_episode(job, keep_states, &replay_factory(recorded, record))?
     } else {
         run.run_episode(job, keep_states, &run.controllers)?

@@ -58,7 +58,8 @@ impl RecordedRuns {
     /// The run of a suite whose actions the policy repeats.
     ///
     /// # Errors
-    /// The run is of another suite, seed, split or twin, or lacks some of `episodes`.
+    /// The run is of another suite, seed, split or twin, lacks some of the requested episodes, or has actions that are
+    /// not those of their records.
     pub(crate) fn replay_source(
         &self,
         suite: &str,
@@ -98,6 +99,9 @@ impl RecordedRuns {
                 requested.len()
             ));
         }
+        for index in episodes_with_actions(run).filter(|index| requested.find(*index).is_some()) {
+            run.record(index).map_or(Ok(Vec::new()), |record| actions::read_checked(&run.dir, record))?;
+        }
         Ok(ReplaySource {
             run: run.dir.display().to_string(),
             policy: run.text("policy").to_owned(),
@@ -110,15 +114,19 @@ impl RecordedRuns {
     /// The recorded actions of an episode.
     ///
     /// # Errors
-    /// The actions cannot be read.
+    /// The actions cannot be read, or are not those of the record.
     pub(crate) fn actions(
         &self,
         suite: &str,
         is_twin: bool,
         brief: &EpisodeBrief,
     ) -> Result<Vec<Action>, RunError> {
-        let dir = self.run_of(suite, is_twin).map_or(&self.dir, |run| &run.dir);
-        Ok(actions::read(&actions::path(dir, brief.index()))?)
+        let found = self.run_of(suite, is_twin).and_then(|run| Some((run, run.record(brief.index())?)));
+        let Some((run, record)) = found else {
+            let message = format!("no run has {} of suite {suite}", brief.index());
+            return Err(RunError::of_setting("policy", self.dir.display(), message));
+        };
+        Ok(actions::read_checked(&run.dir, record)?)
     }
 }
 

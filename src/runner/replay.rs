@@ -308,7 +308,7 @@ pub fn replay_episode(
     let record = episode.find_record(run)?;
     let index = record.header.id.index();
     let manifest = StoredManifest { path: &run.dir, manifest: &run.manifest, secret, observer };
-    let actions = actions::read(&actions::path(&run.dir, index))?;
+    let actions = actions::read_checked(&run.dir, record)?;
     let FinishedEpisode { record: simulated, recording, .. } =
         manifest.simulate(record, actions, keeps_states)?;
     Ok(EpisodeReplay { index, difference: difference(record, &simulated)?, simulated, recording })

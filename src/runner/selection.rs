@@ -59,8 +59,12 @@ pub fn select_tasks<'a>(config: &RunConfig, suite: &'a Suite) -> Result<Vec<&'a 
                 1 => "it has only task 0".to_owned(),
                 count => format!("it has tasks 0 to {}", count.saturating_sub(1)),
             };
-            let name = &suite.name;
-            let message = format!("suite {name} has no such task; {available}");
+            let (name, prompt) = (&suite.name, &suite.tasks[0].prompt);
+            let part = match index {
+                Some(_) => String::new(),
+                None => format!("; a word selects those with it in their prompt, such as {prompt:?}"),
+            };
+            let message = format!("suite {name} has no such task; {available}{part}");
             return Err(config.error_of("tasks", word, message));
         }
     }

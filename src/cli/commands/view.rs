@@ -19,6 +19,7 @@ use softvt_records::record::EpisodeRecord;
 use softvt_report::{
     episode_page::{self, PolicyPart},
     mcap::write_mcap,
+    run_folder::RunFolder,
     video::{
         VideoCaption,
         side_by_side::{self, PolicyEpisode},
@@ -83,6 +84,7 @@ pub(super) fn run(args: ViewArgs) -> Result<(), CliError> {
         run.rendered().prepare()
     };
     let runs: Vec<PreparedRun> = configs.iter().map(prepare).collect::<Result<_, _>>()?;
+    RunFolder::check_vacant(&args.out).map_err(|error| CliError::input(format!("--out: {error}")))?;
     files::create_folder(&args.out)?;
     config.observer.work("simulating the episode");
     let simulate = |number: usize| runs[number].run_episode(job, true, &runs[number].controllers);

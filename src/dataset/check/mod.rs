@@ -14,7 +14,7 @@ use super::{
     card::DatasetCard,
     demonstration::{CAMERA_POSES, JOINT_ACTIONS, JOINT_TORQUES, actions_stream_name},
     grip_labels::OPEN_FORCE,
-    layout::{DEPTH_STREAMS, IMAGE_STREAMS, MANIFEST, is_image_stream},
+    layout::{CARD, DEPTH_STREAMS, IMAGE_STREAMS, MANIFEST, is_image_stream},
     manifest::{self, ManifestEntry},
 };
 use softvt_benchmark::{CONTROL_DT, CONTROL_HZ};
@@ -101,6 +101,10 @@ pub fn folder(root: &Path, scope: CheckScope) -> Result<CheckReport, DatasetErro
     // The manifest says of other folders what they are.
     let (entries, card) = (manifest::read(root)?, DatasetCard::read(root)?);
     let mut report = CheckReport::default();
+    if card.fps != CONTROL_HZ {
+        let what = format!("fps is {}, and softvt records {CONTROL_HZ} control steps per second", card.fps);
+        report.add(&root.join(CARD), "fps", what);
+    }
     let mut files: BTreeMap<&str, Vec<&ManifestEntry>> = BTreeMap::new();
     for entry in &entries {
         files.entry(&entry.hdf5_path).or_default().push(entry);
@@ -110,13 +114,18 @@ pub fn folder(root: &Path, scope: CheckScope) -> Result<CheckReport, DatasetErro
     }
     for task in &card.tasks {
         let of_task = |e: &&ManifestEntry| e.task_id == task.task && e.suite == task.suite;
-        let listed = entries.iter().filter(of_task).count();
-        if listed != task.demos {
-            let what = format!(
-                "{listed} lines of {} task {}, dataset.json says {}",
-                task.suite, task.task, task.demos
-            );
-            report.add(&root.join(MANIFEST), "lines", what);
+        let listed: Vec<&ManifestEntry> = entries.iter().filter(of_task).collect();
+        let samples: usize = listed.iter().map(|entry| entry.num_samples).sum();
+        for (name, listed, stated) in
+            [("lines", listed.len(), task.demos), ("num_samples", samples, task.samples)]
+        {
+            if listed != stated {
+                let what = format!(
+                    "{listed} in all of {} task {}, dataset.json says {stated}",
+                    task.suite, task.task
+                );
+                report.add(&root.join(MANIFEST), name, what);
+            }
         }
     }
     for path in stray_files(root, &files) {
@@ -168,6 +177,9 @@ fn check_entry(report: &mut CheckReport, file: &TaskFile, entry: &ManifestEntry)
         ("episode", json!(id.episode), json!(entry.episode)),
         ("safety", json!(record.verdict.safety), json!(entry.success)),
         ("d_peak", json!(record.verdict.d_peak), json!(entry.d_peak)),
+        ("seed", json!(id.base_seed), json!(entry.seed)),
+        ("notes", json!(record.stats.notes), json!(entry.notes)),
+        ("metrics", json!(record.stats.metrics), json!(entry.metrics)),
     ] {
         if found != listed {
             let what = format!("{name} is {found}, the manifest says {listed}");

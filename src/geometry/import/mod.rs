@@ -196,7 +196,7 @@ fn obj_colours(
     check_material_names(bytes, &libraries.into_inner())?;
     // Without any material file this is an error of the library.
     let mut materials: Vec<ImportedMaterial> =
-        materials.unwrap_or_default().into_iter().map(material_of_mtl).collect();
+        materials.unwrap_or_default().into_iter().map(material_of_mtl).collect::<Result<_, String>>()?;
     if materials.is_empty() {
         return Ok(ImportedColours::default());
     }
@@ -232,10 +232,13 @@ fn check_material_names(obj: &[u8], libraries: &[MaterialLibrary]) -> Result<(),
                     let path = shortened(&later.path);
                     return Err(format!("usemtl {name} is above mtllib {path}; move mtllib to the top"));
                 }
-                if let Some(last) = libraries.last() {
-                    let path = shortened(&last.path);
-                    return Err(format!("{path} has no material {name}; add it there, or correct usemtl"));
-                }
+                return Err(match libraries.last() {
+                    Some(last) => {
+                        let path = shortened(&last.path);
+                        format!("{path} has no material {name}; add it there, or correct usemtl")
+                    }
+                    None => format!("usemtl {name}: the file names no mtllib; add it, or remove usemtl"),
+                });
             }
             _ => {}
         }
@@ -256,7 +259,7 @@ fn plain_id(count: usize) -> Result<u16, String> {
     u16::try_from(count).map_err(|_| format!("has {count} materials; at most {most} are drawn, merge some"))
 }
 
-fn material_of_mtl(material: tobj::Material) -> ImportedMaterial {
+fn material_of_mtl(material: tobj::Material) -> Result<ImportedMaterial, String> {
     // Options before the name, such as "-bm 1", are not followed.
     let image = material.diffuse_texture.map(|text| match text.starts_with('-') {
         true => text.split_whitespace().next_back().unwrap_or_default().to_owned(),
@@ -266,10 +269,16 @@ fn material_of_mtl(material: tobj::Material) -> ImportedMaterial {
     let albedo = match (&image, material.diffuse) {
         // Exporters write a grey beside an image.
         (Some(_), _) => [1.0; 3],
-        (None, Some(colour)) => colour.map(|x| f64::from(x).clamp(0.0, 1.0)),
+        (None, Some(colour)) if colour.iter().all(|x| (0.0..=1.0).contains(x)) => colour.map(f64::from),
+        (None, Some([r, g, b])) => {
+            let name = shortened(&material.name);
+            return Err(format!(
+                "material {name}: Kd is {r} {g} {b}; give shares of 1, such as 0.5 for 128 of 255"
+            ));
+        }
         (None, None) => plain.albedo,
     };
-    ImportedMaterial { albedo, image: image.map(ImportedImage::File), ..plain }
+    Ok(ImportedMaterial { albedo, image: image.map(ImportedImage::File), ..plain })
 }
 
 fn read_obj(bytes: &[u8]) -> Result<Mesh, MeshImportError> {
@@ -278,6 +287,15 @@ fn read_obj(bytes: &[u8]) -> Result<Mesh, MeshImportError> {
     let no_materials = |_: &std::path::Path| Err(tobj::LoadError::OpenFileFailed);
     let (models, _) = tobj::load_obj_buf(&mut Cursor::new(bytes), &OBJ_OPTIONS, no_materials)
         .map_err(|error| unreadable(error.to_string()))?;
+    // The reader numbers vertices by their first use.
+    let is_bad = |line: &str| {
+        let mut words = line.split_whitespace();
+        let is_number = |word: &str| word.parse::<f64>().is_ok_and(f64::is_finite);
+        words.next() == Some("v") && !words.take(3).all(is_number)
+    };
+    if let Some(at) = String::from_utf8_lossy(bytes).lines().position(is_bad) {
+        return Err(unreadable(format!("line {} has a coordinate that is not a number", at + 1)));
+    }
     let mut out = Mesh::default();
     let textured = models.iter().any(|model| !model.mesh.texcoords.is_empty());
     for tobj::Model { mesh, .. } in &models {
@@ -298,7 +316,26 @@ fn read_obj(bytes: &[u8]) -> Result<Mesh, MeshImportError> {
     Ok(out)
 }
 
+/// Bytes before the triangles of a binary STL file, the last four of which count them, and of a triangle.
+const STL_HEADER: usize = 84;
+const STL_TRIANGLE: usize = 50;
+
+/// Checks the length of a binary STL file. Text files begin with a word.
+fn check_stl_length(bytes: &[u8]) -> Result<(), MeshImportError> {
+    if bytes.starts_with(b"solid") {
+        return Ok(());
+    }
+    let count = bytes.get(STL_HEADER - 4..).and_then(|rest| rest.first_chunk());
+    let Some(count) = count.map(|count| u32::from_le_bytes(*count) as usize) else {
+        let reason = "it neither begins with \"solid\" nor has the header of a binary file".to_owned();
+        return Err(MeshImportError::Unreadable { format: "STL", reason });
+    };
+    let (declared, actual) = (STL_HEADER + STL_TRIANGLE * count, bytes.len());
+    if declared == actual { Ok(()) } else { Err(MeshImportError::Length { declared, actual }) }
+}
+
 fn read_stl(bytes: &[u8]) -> Result<Mesh, MeshImportError> {
+    check_stl_length(bytes)?;
     let read = stl_io::read_stl(&mut Cursor::new(bytes))
         .map_err(|error| MeshImportError::Unreadable { format: "STL", reason: error.to_string() })?;
     let place = |v: &stl_io::Vertex| Vec3::new(f64::from(v[0]), f64::from(v[1]), f64::from(v[2]));

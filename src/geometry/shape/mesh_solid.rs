@@ -11,6 +11,7 @@ use super::combine::SignedDistance;
 use crate::{
     Vec3,
     mesh::{Mesh, MeshError},
+    mesh_overlap::check_pieces,
     parry::{from_parry, to_parry},
 };
 
@@ -81,6 +82,7 @@ impl MeshSolid {
         if volume.abs() < 1e-6 * mesh.area().powf(1.5) {
             return Err(MeshError::Flat);
         }
+        check_pieces(&mesh)?;
         let points = mesh.vertices.iter().map(to_parry).collect();
         let tree = TriMesh::with_flags(points, mesh.triangles.clone(), TriMeshFlags::ORIENTED)
             .map_err(|_| MeshError::Empty)?;

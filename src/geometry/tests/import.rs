@@ -134,8 +134,8 @@ fn open_empty_flat_and_malformed_files_are_refused_with_a_reason() {
     );
     assert_eq!(refusal("v 0 0 0\n"), MeshImportError::Mesh(MeshError::Empty));
     assert_eq!(
-        refusal(&CUBE.replace("v 1 1 1", "v 1 nan 1")),
-        MeshImportError::Mesh(MeshError::NotFinite { vertex: 6 })
+        refusal(&CUBE.replace("v 1 1 1", "v 1 nan 1")).to_string(),
+        "cannot be read as OBJ: line 7 has a coordinate that is not a number"
     );
     let textured = CUBE.replace("f 4 3 2 1", "vt 0 0\nvt nan 0\nf 4/1 3/1 2/2 1/1");
     assert_eq!(refusal(&textured), MeshImportError::Mesh(MeshError::TextureNotFinite { triangle: 0 }));
@@ -144,6 +144,11 @@ fn open_empty_flat_and_malformed_files_are_refused_with_a_reason() {
     let twice = format!("{CUBE}f 4 3 2 1\n");
     assert!(matches!(refusal(&twice), MeshImportError::Mesh(MeshError::NonManifold { .. })));
     assert!(matches!(refusal("v a b c\n"), MeshImportError::Unreadable { format: "OBJ", .. }));
+    let whole = stl(&read_obj(CUBE).expect("a cube"));
+    for bytes in [&whole[..whole.len() - 1], &[&whole[..], b"more"].concat()] {
+        let refused = import(bytes, MeshFormat::Stl, &METRES).expect_err("another length");
+        assert_eq!(refused, MeshImportError::Length { declared: whole.len(), actual: bytes.len() });
+    }
     for format in [MeshFormat::Stl, MeshFormat::Gltf] {
         assert!(matches!(import(b"not a mesh", format, &METRES), Err(MeshImportError::Unreadable { .. })));
     }
@@ -273,7 +278,11 @@ fn materials_of_obj_files_are_those_of_their_mtl_files() {
     let late = format!("usemtl blue\n{coloured}");
     let error = "usemtl blue is above mtllib cube.mtl; move mtllib to the top".to_owned();
     assert_eq!(colours(&late, &read(mtl)), Err(error));
-    assert_eq!(colours(&late.replace("mtllib", "#"), &read(mtl)), Ok(ImportedColours::default()));
+    let error = "usemtl blue: the file names no mtllib; add it, or remove usemtl".to_owned();
+    assert_eq!(colours(&late.replace("mtllib", "#"), &read(mtl)), Err(error));
+    let bytes = "newmtl paper\nKd 0 0 255\nnewmtl blue\nKd 0 0.25 1\n";
+    let error = "material paper: Kd is 0 0 255; give shares of 1, such as 0.5 for 128 of 255".to_owned();
+    assert_eq!(colours(&coloured, &read(bytes)), Err(error));
     let (named, long) = ("x".repeat(1000), "x".repeat(80));
     let error = colours(&coloured.replace("blue", &named), &read(mtl)).expect_err("unknown");
     assert!(error.contains(&format!("material {long}…;")), "{error}");
