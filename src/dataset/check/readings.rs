@@ -15,6 +15,9 @@ const SENSOR_ERROR: f64 = 2e-3;
 /// Largest distance of an object from the origin, m: another one is in another unit.
 const MAX_DISTANCE_M: f64 = 20.0;
 
+/// Share of the peak of D that some control step has at least.
+const MIN_SHARE_OF_PEAK: f64 = 0.5;
+
 impl DemoCheck<'_> {
     /// The numbers of a stream; none if it is missing, which is a problem only of required streams.
     fn values(&mut self, name: &str) -> Vec<f64> {
@@ -171,6 +174,15 @@ impl DemoCheck<'_> {
         let is_wrong = |(rms, most): &(&f64, &f64)| **rms < 0.0 || **rms > **most + TOLERANCE;
         let what = "expected 0 or more and at most privileged/d_max";
         self.add_first("privileged/d", rms.iter().zip(&most), is_wrong, what);
+        // Demonstrations of other programs have no record.
+        let peak = self.file.record(self.demo).ok().and_then(|record| record.verdict.d_peak);
+        if let Some(peak) = peak.filter(|_| !rms.is_empty()) {
+            let own = rms.iter().copied().fold(0.0, f64::max);
+            // The peak may lie between two control steps.
+            if own > peak + TOLERANCE || own < MIN_SHARE_OF_PEAK * peak {
+                self.add("privileged/d", format!("its largest is {own}, and d_peak of the record {peak}"));
+            }
+        }
         let Some(names) = self.report.take(self.file.names(self.demo)) else { return };
         for name in names.iter().filter(|name| name.starts_with("privileged/states/")) {
             let values = self.values(name);

@@ -291,3 +291,46 @@ fn a_server_may_state_the_meaning_of_its_actions() {
     let error = check_entry("pose", "tool".into()).unwrap_err();
     assert!(error.contains("expected one of absolute, delta, delta_osc, joints"), "{error}");
 }
+
+#[test]
+fn a_vla_eval_server_that_states_other_actions_is_refused() {
+    let part = |format: &str, range: [f64; 2]| {
+        map([("format", Value::from(format)), ("range", Value::Array(range.map(Value::F64).to_vec()))])
+    };
+    let check = |profile: &str, [position, rotation, gripper]: [&str; 3], range: [f64; 2]| {
+        let mut server = policy_server(String::new(), GripCode::Binary, Duration::from_secs(1));
+        server.profile = Profile::named(profile).unwrap();
+        let spec = map([
+            ("position", part(position, [-1.0, 1.0])),
+            ("rotation", part(rotation, [-3.15, 3.15])),
+            ("gripper", part(gripper, range)),
+        ]);
+        vla_eval::check_action_spec(&server, &map([("action_spec", spec)])).map_err(|error| error.to_string())
+    };
+    let delta = ["delta_xyz", "axis_angle", "binary_close_positive"];
+    assert_eq!(check("libero", delta, [-1.0, 1.0]), Ok(()));
+    assert_eq!(check("libero", ["delta_xyz", "euler_xyz", "raw"], [-1.0, 1.0]), Ok(()));
+    let absolute = ["absolute_xyz", "axis_angle", "continuous_01"];
+    assert_eq!(check("vision", absolute, [0.0, 1.0]), Ok(()));
+    for (profile, stated, range, expected) in [
+        (
+            "vision",
+            delta,
+            [0.0, 1.0],
+            "positions as delta_xyz, and the profile vision reads actions of pose absolute",
+        ),
+        ("libero", absolute, [-1.0, 1.0], "choose a profile with pose = \"absolute\""),
+        ("vision", ["absolute_xyz", "euler_xyz", "raw"], [0.0, 1.0], "rotations as euler_xyz"),
+        ("libero", ["delta_xyz", "quaternion_xyzw", "raw"], [-1.0, 1.0], "rotations as quaternion_xyzw"),
+        (
+            "libero",
+            ["delta_xyz", "axis_angle", "binary_close_negative"],
+            [-1.0, 1.0],
+            "reads -1 as open and 1 as closed",
+        ),
+        ("libero", ["delta_xyz", "axis_angle", "continuous_01"], [0.0, 1.0], "continuous_01 from 0 to 1"),
+    ] {
+        let error = check(profile, stated, range).unwrap_err();
+        assert!(error.contains(expected) && error.contains("action_spec"), "{error}");
+    }
+}

@@ -8,12 +8,12 @@ use std::time::Instant;
 
 use rmpv::Value;
 
-use super::connection::PolicyConnection;
+use super::connection::{PolicyConnection, PolicyServer};
 use crate::{
     ActionChunk, EpisodeBrief, Observation, PolicyError, QueryId, decode,
     encode::content,
     msgpack::{entry, map, names},
-    profile::{ObservationSource, Profile},
+    profile::{GripCode, GripperValues, ObservationSource, PoseEncoding, Profile},
 };
 
 const VERSION: u64 = 1;
@@ -32,12 +32,75 @@ pub(super) fn greet(connection: &mut PolicyConnection, deadline: Instant) -> Res
         return Err(connection.server.error(&format!("answered hello with {kind:?}")));
     }
     match entry(payload, "protocol_version").and_then(Value::as_u64) {
-        Some(VERSION) | None => super::check_action_codes(&connection.server, payload),
+        Some(VERSION) | None => {
+            super::check_action_codes(&connection.server, payload)?;
+            check_action_spec(&connection.server, payload)
+        }
         Some(other) => {
             let what = format!("uses version {other} of vla-eval's protocol; expected {VERSION}");
             Err(connection.server.error(&what))
         }
     }
+}
+
+/// Checks what the entry `action_spec` of a server states of its actions, in the words of vla-eval's specs. Formats that
+/// are not known pass.
+///
+/// # Errors
+/// It contradicts the profile.
+pub(super) fn check_action_spec(server: &PolicyServer, hello: &Value) -> Result<(), PolicyError> {
+    let Profile { name, actions, .. } = &server.profile;
+    let Some(spec) = entry(hello, "action_spec") else { return Ok(()) };
+    let format = |part: &str| entry(entry(spec, part)?, "format").and_then(Value::as_str);
+    let refuse = |what: String| Err(server.error(&format!("states {what} in its action_spec")));
+    let (own, is_absolute) = (actions.pose.name(), actions.pose == PoseEncoding::Absolute);
+    let is_delta = matches!(actions.pose, PoseEncoding::Delta { .. } | PoseEncoding::DeltaOsc { .. });
+    let position = format("position");
+    let needed = match position {
+        Some("absolute_xyz") if !is_absolute => Some("\"absolute\""),
+        Some("delta_xyz") if !is_delta => Some("\"delta\" or \"delta_osc\""),
+        _ => None,
+    };
+    if let (Some(position), Some(needed)) = (position, needed) {
+        return refuse(format!(
+            "positions as {position}, and the profile {name} reads actions of pose {own}: choose a profile with pose = {needed}"
+        ));
+    }
+    match format("rotation") {
+        // Of a small rotation, Euler angles are those of its axis.
+        Some(rotation @ ("quaternion_xyzw" | "rot6d_interleaved")) => {
+            return refuse(format!(
+                "rotations as {rotation}, and softvt reads axis_angle: convert them there"
+            ));
+        }
+        Some(rotation @ "euler_xyz") if is_absolute => {
+            return refuse(format!(
+                "rotations as {rotation}, and softvt reads axis_angle: convert them there"
+            ));
+        }
+        _ => {}
+    }
+    let GripperValues { open, closed, code, .. } = actions.gripper;
+    let range = entry(spec, "gripper").and_then(|gripper| entry(gripper, "range")).and_then(Value::as_array);
+    let range = range.and_then(|range| match &range[..] {
+        [low, high] => Some([low.as_f64()?, high.as_f64()?]),
+        _ => None,
+    });
+    let is_reversed = match format("gripper") {
+        Some("binary_close_negative") => closed > open,
+        Some("binary_close_positive" | "binary_close_01") => closed < open,
+        _ => false,
+    };
+    let is_other_range = range.is_some_and(|range| range != [open.min(closed), open.max(closed)]);
+    if code != GripCode::Force && (is_reversed || is_other_range) {
+        let gripper = format("gripper").unwrap_or_default();
+        let range = range.map_or(String::new(), |[low, high]| format!(" from {low} to {high}"));
+        return refuse(format!(
+            "the gripper as {gripper}{range}, and the profile {name} reads {open} as open and {closed} as closed: choose or \
+             write a profile with these values"
+        ));
+    }
+    Ok(())
 }
 
 pub(super) fn start(

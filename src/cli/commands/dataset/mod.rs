@@ -178,8 +178,8 @@ fn run_export(args: ExportArgs) -> Result<(), CliError> {
     ))
 }
 
-/// Tells the first problem of the numbers of a recording. Recordings of earlier versions lack streams that an export
-/// does not need.
+/// Tells the first problem of the numbers of a recording. Recordings of earlier versions lack streams that exports and
+/// distributions do not need.
 fn warn_of_problems(data: &Path) -> Result<(), CliError> {
     let problems = check::folder(data, CheckScope::Numbers)?.problems;
     if let Some(first) = problems.first() {
@@ -208,7 +208,7 @@ fn run_stats(args: &DatasetStatsArgs) -> Result<(), CliError> {
     let out = args.out.clone().unwrap_or(default);
     files::replace(&out, stats::svg(&distributions).as_bytes())?;
     eprint_notice(out.display());
-    Ok(())
+    if path.is_dir() { warn_of_problems(path) } else { Ok(()) }
 }
 
 #[cfg(test)]
