@@ -80,6 +80,7 @@ mod episode;
 mod episode_error;
 mod evidence;
 mod goal_in_scene;
+mod joint_warnings;
 mod metric;
 mod observation_history;
 mod robot_instance;

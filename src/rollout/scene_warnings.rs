@@ -2,7 +2,10 @@
 
 use std::collections::BTreeSet;
 
-use super::asset_cache::{AssetCache, ThicknessProbe};
+use super::{
+    asset_cache::{AssetCache, ThicknessProbe},
+    joint_warnings::joint_warnings,
+};
 use softvt_benchmark::{CONTROL_DT, Task, goal_conflict::least_time};
 use softvt_common::text::{format_number, is_misspelt};
 use softvt_geometry::pieces::SeparatePieces;
@@ -13,8 +16,9 @@ use softvt_scene::{
 };
 
 /// Warnings about a scene of a task, one line each: materials, soft bodies of few voxels, bodies of several pieces or
-/// off their axis, hints with misspelt names, a target that the gripper cannot grasp, objects outside of the workspace,
-/// cameras that do not show what the goal names, and a budget below what the goal takes.
+/// off their axis, joints of unlikely numbers, hints with misspelt names, a target that the gripper cannot grasp,
+/// objects outside of the workspace, cameras that do not show what the goal names, and a budget below what the goal
+/// takes.
 pub fn scene_warnings(task: &Task, scene: &Scene, cache: &AssetCache) -> BTreeSet<String> {
     let warnings = |asset: &Asset| {
         let name = asset.name.clone();
@@ -24,6 +28,7 @@ pub fn scene_warnings(task: &Task, scene: &Scene, cache: &AssetCache) -> BTreeSe
             .chain(voxel_warning(asset, cache))
             .chain(pieces_warning(asset, cache))
             .chain(origin_warning(asset, cache))
+            .chain(joint_warnings(asset, cache))
             .chain(hint_warnings(asset))
             .chain(hint_value_warning(asset, cache))
             .map(move |warning| format!("asset {name}: {warning}"))
