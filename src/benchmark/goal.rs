@@ -161,10 +161,42 @@ impl Goal {
         }
     }
 
-    /// Description of the goal: "bun in cabinet.top_drawer".
+    /// The goal with the ranges of joints in place of shares, m or rad, where `limits` knows the lowest and highest
+    /// value of a joint. Values are rounded to a micrometre or microradian.
+    pub fn with_joint_ranges(&self, limits: &impl Fn(&str) -> Option<[f64; 2]>) -> Self {
+        let rounded = |value: f64| (1e6 * value).round() / 1e6;
+        let range = |joint: &String, shares: [f64; 2]| {
+            let [low, high] = limits(joint)?;
+            let range = shares.map(|share| rounded(low + share * (high - low)));
+            Some(Self::Turned { joint: joint.clone(), range })
+        };
+        let parts = |parts: &Parts| Parts {
+            goals: parts.goals.iter().map(|goal| goal.with_joint_ranges(limits)).collect(),
+        };
+        match self {
+            Self::Opened { joint, share } => range(joint, [*share, 1.0]).unwrap_or_else(|| self.clone()),
+            Self::Closed { joint, share } => range(joint, [0.0, *share]).unwrap_or_else(|| self.clone()),
+            Self::Turned { joint, range } => Self::Turned { joint: joint.clone(), range: range.map(rounded) },
+            Self::All(of) => Self::All(parts(of)),
+            Self::Any(of) => Self::Any(parts(of)),
+            Self::None(of) => Self::None(parts(of)),
+            Self::Sequence(of) => Self::Sequence(parts(of)),
+            other => other.clone(),
+        }
+    }
+
+    /// Description of the goal: "bun in cabinet.top_drawer". Goals that differ in their structure differ in text: a
+    /// sequence within another combination is in parentheses.
     pub fn describe(&self) -> String {
-        let joined =
-            |parts: &Parts, word: &str| parts.goals.iter().map(Self::describe).collect::<Vec<_>>().join(word);
+        let joined = |parts: &Parts, word: &str| {
+            let part = |goal: &Self| match goal {
+                Self::Sequence(steps) if steps.goals.len() > 1 && parts.goals.len() > 1 => {
+                    format!("({})", goal.describe())
+                }
+                _ => goal.describe(),
+            };
+            parts.goals.iter().map(part).collect::<Vec<_>>().join(word)
+        };
         match self {
             Self::On(Placement { object, target, .. }) => format!("{object} on {target}"),
             Self::Inside(Placement { object, target, .. }) => format!("{object} in {target}"),
@@ -184,5 +216,26 @@ impl Goal {
             Self::None(parts) => format!("not ({})", joined(parts, " or ")),
             Self::Sequence(parts) => joined(parts, ", then "),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn goals_of_other_structure_have_other_descriptions() {
+        let named = |name: &str| Goal::Predicate { name: name.into() };
+        let (a, b) = (|| named("A"), || named("B"));
+        let of = |goals: Vec<Goal>| Parts { goals };
+        let all = |goals| Goal::All(of(goals));
+        let sequence = |goals| Goal::Sequence(of(goals));
+        let not_a = || Goal::None(of(vec![a()]));
+        assert_eq!(all(vec![sequence(vec![a(), not_a()]), b()]).describe(), "(A, then not (A)) and B");
+        assert_eq!(sequence(vec![a(), all(vec![not_a(), b()])]).describe(), "A, then not (A) and B");
+        assert_eq!(sequence(vec![a(), sequence(vec![b(), a()])]).describe(), "A, then (B, then A)");
+        assert_eq!(Goal::None(of(vec![sequence(vec![a(), b()])])).describe(), "not (A, then B)");
+        assert_eq!(all(vec![sequence(vec![a(), b()])]).describe(), "A, then B");
+        assert_eq!(Goal::Any(of(vec![all(vec![a(), b()]), b()])).describe(), "(A and B or B)");
     }
 }

@@ -7,7 +7,8 @@ use crate::goal::{Goal, Parts};
 /// The reason for which a goal can never be met, in words; `None` if none was found.
 ///
 /// Predicates that must hold at once are compared in pairs, and what rests on what must not be a circle. Of
-/// `softvt.any`, each alternative is compared with what must hold at the same time. Geometry is not considered.
+/// `softvt.any`, each alternative is compared with what must hold at the same time. Geometry is not considered, and
+/// shares of a joint are compared with its values only in a goal of [`Goal::with_joint_ranges`].
 pub fn conflict(goal: &Goal) -> Option<String> {
     let moment = Moment::of(goal);
     if let Some(found) = moment.conflict() {
@@ -215,6 +216,18 @@ mod tests {
         found(all(vec![opened(0.7), any(vec![closed(0.1), none(vec![opened(0.7)])])]), "drawer open");
         found(sequence(vec![all(vec![opened(0.7), closed(0.1)]), on("a", "b")]), "cannot hold at once");
         found(none(vec![none(vec![opened(0.7)]), opened(0.7)]), "must hold and must not hold");
+    }
+
+    #[test]
+    fn shares_and_values_of_a_joint_are_compared_by_its_range() {
+        let turned = |range| Goal::Turned { joint: "drawer".into(), range };
+        let limits = |joint: &str| (joint == "drawer").then_some([0.0, 0.1]);
+        let found = |goal: Goal| conflict(&goal.with_joint_ranges(&limits));
+        let expected = "\"drawer turned to 0.09..0.1\" and \"drawer turned to 0..0.02\" cannot hold at once";
+        assert_eq!(found(all(vec![opened(0.9), turned([0.0, 0.02])])).as_deref(), Some(expected));
+        assert_eq!(found(all(vec![opened(0.3), turned([0.0, 0.03])])), None, "0.3 × 0.1 is rounded");
+        assert_eq!(found(any(vec![opened(0.9), turned([0.0, 0.02])])), None);
+        assert!(found(all(vec![opened(0.7), none(vec![opened(0.7)])])).is_some());
     }
 
     #[test]
