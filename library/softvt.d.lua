@@ -162,7 +162,7 @@
 ---@field options? any Result of softvt.options, passed to the functions below as opt.
 ---@field grid? table<string, any[]> Values of each parameter. Every combination is run, names in alphabetical order, the last one fastest.
 ---@field points? fun(opt: table): table[] Returns the points instead of a grid.
----@field run fun(point: table, opt: table): table|table[] Returns a row, or a list of rows, for one point. Points run in any order and on several threads, each in a new run of the script: variables that one changes are not seen by others.
+---@field run fun(point: table, opt: table): table|table[] Returns a row, or a list of rows, for one point. Points run in any order and on several threads, each in a new run of the script: variables that one changes are not seen by others. Reading a field of the point that is no parameter of the grid, or a misspelt one of `points`, is an error.
 ---@field finish? fun(rows: table[], opt: table): softvt.Finish? Summarizes all rows.
 ---@field columns? string[] Columns of the table, in order; by default all, sorted.
 

@@ -1,5 +1,7 @@
 //! Experiments: points that do not depend on each other, and results that are refused.
 
+use insta::assert_snapshot;
+
 use crate::support::Project;
 
 fn experiment(fields: &str) -> Project {
@@ -27,6 +29,15 @@ fn variables_that_a_point_changes_do_not_reach_others() {
 }
 
 #[test]
+fn a_point_may_be_written_returned_and_lack_a_field() {
+    let run = "run = function(p) p.c = p.b or 0 return p end";
+    let rows = |points: &str| experiment(&format!("{points}, {run}")).run("x.lua").rows();
+    let listed = rows("points = function() return { { a = 1 }, { a = 2, b = 3 } } end");
+    assert_eq!((listed[0]["c"].as_f64(), listed[1]["c"].as_f64()), (Some(0.0), Some(3.0)));
+    assert_eq!(rows("grid = { a = { 1 }, b = { 5 } }")[0]["c"].as_f64(), Some(5.0));
+}
+
+#[test]
 fn experiments_without_results_are_refused() {
     let run = "run = function(point) return { b = point.a } end";
     assert!(
@@ -36,7 +47,11 @@ fn experiments_without_results_are_refused() {
     let points = format!("points = function() return {{ a = 1 }} end, {run}");
     assert!(problem(&points).contains("experiment.points: expected a list of at least one table"));
     let misspelt = "grid = { a = { 1 } }, run = function(point) return { b = point.aa } end";
-    assert!(problem(misspelt).contains("experiment.run: no point returned a row"));
+    assert_snapshot!(problem(misspelt), @r#"x.lua:2: point: unknown key "aa"; did you mean "a"? (point 0 {"a":1})"#);
+    let listed = "points = function() return { { young = 1 }, { change = 2 } } end, run = function(p) return { b = p.change or p.youngs } end";
+    assert_snapshot!(problem(listed), @r#"x.lua:2: point: unknown key "youngs"; did you mean "young"? (point 0 {"young":1})"#);
+    assert_snapshot!(problem(&format!("grid = {{ a = {{ 1, 2, 1 }} }}, {run}")), @"x.lua:2: experiment.grid.a: has 1 twice; give each value once");
+    assert_snapshot!(problem(&format!("grid = {{ a = {{ 1 }} }}, columns = {{ 'b', 'b' }}, {run}")), @r#"x.lua:2: experiment.columns: has "b" twice; give each once"#);
     let columns = format!("grid = {{ a = {{ 1 }} }}, columns = {{ 'bb' }}, {run}");
     assert!(
         problem(&columns).contains(

@@ -203,7 +203,8 @@ record! {
         /// Returns the points instead of a grid.
         points: Option<Function> = Type::Function("fun(opt: table): table[]");
         /// Returns a row, or a list of rows, for one point. Points run in any order and on several threads, each in a
-        /// new run of the script: variables that one changes are not seen by others.
+        /// new run of the script: variables that one changes are not seen by others. Reading a field of the point that
+        /// is no parameter of the grid, or a misspelt one of `points`, is an error.
         run: Function = Type::Function("fun(point: table, opt: table): table|table[]");
         /// Summarizes all rows.
         finish: Option<Function> = Type::Function("fun(rows: table[], opt: table): softvt.Finish?");

@@ -1,6 +1,7 @@
 //! Loading a script: the value that it returns becomes a [`Plan`] of plain data.
 
 pub(crate) mod options;
+mod points;
 pub(crate) mod policy_file;
 pub(crate) mod profile_file;
 pub(crate) mod variation_file;
@@ -33,6 +34,7 @@ use crate::{
     },
 };
 use options::{OptionSession, OptionSpec, SharedOptions};
+pub(crate) use points::{Points, points};
 use softvt_benchmark::{
     Condition, Goal, ObjectType, Plan, Shift, ShiftValue, Suite, Task, TaskDifference,
     goal_conflict::conflict, metric::Metric, seed::SecretSeed, settings::Settings,
@@ -275,7 +277,7 @@ impl ScriptInstance {
         if let Some(spec) = self.result::<ExperimentSpec>()? {
             let _deadline = self.vm.call_deadline();
             let points = points(lua, &spec)?.len();
-            let columns = spec.spec.columns;
+            let columns = columns(lua, &spec)?;
             let has_finish = spec.spec.finish.is_some();
             return Ok(Plan::Experiment { name: spec.spec.name, points, columns, has_finish });
         }
@@ -492,6 +494,7 @@ fn twin_of(lua: &Lua, spec: &Constructed<SuiteSpec>) -> mlua::Result<Option<Stri
 fn task(lua: &Lua, id: usize, spec: &Constructed<TaskSpec>, budget: u32) -> mlua::Result<Task> {
     let (goal, predicates) = spec.goal.plain(lua)?;
     for DeclaredPredicate { goal, table, .. } in &predicates {
+        // Those of a stack differ.
         if let Some(target) = goal.target().filter(|target| Some(*target) == goal.object()) {
             let message = format!(
                 "task.goal.target: is {target:?}, which is the object itself; name what it must reach"
@@ -553,79 +556,14 @@ fn condition(lua: &Lua, list: &Table, spec: &ConditionSpec) -> mlua::Result<Cond
     })
 }
 
-/// Points of the grid of an experiment.
-const MAX_POINTS: usize = 1_000_000;
-
-/// The points of an experiment.
-pub(crate) enum Points {
-    /// Those of its function.
-    Listed(Vec<Value>),
-    /// Every combination of the values of a grid, the last parameter first.
-    Grid(Vec<(String, Vec<Value>)>),
-}
-
-impl Points {
-    /// Number of points.
-    pub(crate) fn len(&self) -> usize {
-        match self {
-            Self::Listed(points) => points.len(),
-            Self::Grid(grid) => {
-                grid.iter().fold(1, |count: usize, (_, values)| count.saturating_mul(values.len()))
-            }
+/// The columns of the table of an experiment, whose names must differ.
+fn columns(lua: &Lua, spec: &Constructed<ExperimentSpec>) -> mlua::Result<Vec<String>> {
+    let columns = &spec.columns;
+    match (1..columns.len()).find(|at| columns[..*at].contains(&columns[*at])) {
+        Some(twice) => {
+            let message = format!("experiment.columns: has {:?} twice; give each once", columns[twice]);
+            Err(fail_at_key(lua, &spec.table, "columns", message))
         }
-    }
-
-    /// Point `index`; nil beyond the last. Only this one is made, since each point of a run opens the script.
-    pub(crate) fn get(&self, lua: &Lua, mut index: usize) -> mlua::Result<Value> {
-        match self {
-            _ if index >= self.len() => Ok(Value::Nil),
-            Self::Listed(points) => Ok(points[index].clone()),
-            Self::Grid(grid) => {
-                let point = lua.create_table()?;
-                for (name, values) in grid {
-                    point.raw_set(name.as_str(), &values[index % values.len()])?;
-                    index /= values.len();
-                }
-                Ok(Value::Table(point))
-            }
-        }
-    }
-}
-
-/// The points of an experiment: those of its function, or every combination of its grid.
-pub(crate) fn points(lua: &Lua, spec: &ExperimentSpec) -> mlua::Result<Points> {
-    match (&spec.points, &spec.grid) {
-        (Some(points), None) => {
-            let list: Value = points.call(spec.options.clone())?;
-            let Value::Table(list) = &list else {
-                let message =
-                    format!("experiment.points: expected a list of tables, got {}", describe(&list));
-                return Err(fail(lua, message));
-            };
-            let points: Vec<Value> = list.clone().sequence_values().collect::<mlua::Result<_>>()?;
-            match (points.is_empty(), points.iter().all(Value::is_table)) {
-                (true, _) => {
-                    Err(fail(lua, "experiment.points: expected a list of at least one table, got none"))
-                }
-                (false, true) => Ok(Points::Listed(points)),
-                (false, false) => Err(fail(lua, "experiment.points: every point is a table")),
-            }
-        }
-        (None, Some(grid)) => {
-            if let Some(name) = grid.iter().find_map(|(name, values)| values.is_empty().then_some(name)) {
-                return Err(fail(
-                    lua,
-                    format!("experiment.grid.{name}: expected at least one value, got none"),
-                ));
-            }
-            let grid = Points::Grid(
-                grid.iter().rev().map(|(name, values)| (name.clone(), values.clone())).collect(),
-            );
-            if grid.len() > MAX_POINTS {
-                return Err(fail(lua, "experiment.grid: has more than a million points; give fewer values"));
-            }
-            Ok(grid)
-        }
-        _ => Err(fail(lua, "experiment: give either grid or points")),
+        None => Ok(columns.clone()),
     }
 }

@@ -60,7 +60,7 @@ impl Experiment {
         let instance = loaded.sources.instance_with(|lua| {
             lua.set_app_data(Arc::clone(&input));
         })?;
-        let mut experiment = Self { instance, points: Points::Listed(Vec::new()), input };
+        let mut experiment = Self { instance, points: Points::Grid(Vec::new()), input };
         let vm = &experiment.instance.vm;
         let points = {
             let _deadline = vm.call_deadline();

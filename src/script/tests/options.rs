@@ -65,6 +65,12 @@ fn a_wrong_value_is_refused_with_what_was_expected() {
 }
 
 #[test]
+fn a_lowest_number_above_the_highest_is_refused_as_such() {
+    let error = error_of("softvt.options {\nn = { default = 1, min = 3,\nmax = 2 } }");
+    assert_eq!(error, "suites/x.lua:2: options.n.min: 3 is above max, 2; swap them");
+}
+
+#[test]
 fn rows_follow_the_grid_and_the_options() {
     let project = Project::new(&[("x.lua", SCRIPT)]);
     let loaded = project.load("x.lua", &["--gap-mm=42,40", "--closure=0.25"]).unwrap();
