@@ -398,7 +398,7 @@
 ---Returns a pose in the world frame: `softvt.pose { position = { 0.4, 0, 0.2 }, yaw = math.pi / 2 }`. Without a quaternion the hand points straight down.
 ---@class softvt.PoseSpec
 ---@field position number[] Position. Expects a list of 3 numbers (m, world).
----@field yaw? number Rotation of the downward hand about the vertical. Expects radians in -6.2832..6.2832. Default 0.
+---@field yaw? number Rotation of the downward hand about the vertical, by default 0. Expects radians in -6.2832..6.2832.
 ---@field quaternion? number[] Orientation instead of yaw. Expects a list of 4 numbers (w, x, y, z).
 
 ---Reads a shape from an OBJ, STL or GLB file: `softvt.mesh { file = "mug.obj", scale = 0.001 }`. The surface must be closed. An asset without visuals has the colours and images of the materials in the file: Kd and map_Kd of the MTL files that an OBJ file names, or the base colours of a GLB file; images are PNG or JPEG.
@@ -654,17 +654,17 @@
 
 ---Options of closing and opening.
 ---@class softvt.RateOptions
----@field rate? number Rate of the gripper; 1 is the whole stroke in a second. Expects a number (1/s) above 0. Default 0.5.
+---@field rate? number Rate of the gripper: 1 is the whole stroke in a second, 5 the speed of the fingers. Expects a number (1/s) in 0.001..5. Default 0.5.
 
 ---Options of closing on an object.
 ---@class softvt.GraspOptions
----@field rate? number Rate of the gripper; 1 is the whole stroke in a second. Expects a number (1/s) above 0. Default 0.5.
+---@field rate? number Rate of the gripper: 1 is the whole stroke in a second, 5 the speed of the fingers. Expects a number (1/s) in 0.001..5. Default 0.5.
 ---@field width? number Measured distance of the gels at which closing stops. A tactile servo ignores it. Expects metres in 0..0.08.
 ---@field force? number Mean normal force per pad at which closing stops. A tactile servo ignores it. Expects a number (N) in above 0..140.
 
 ---Options of releasing an object.
 ---@class softvt.ReleaseOptions
----@field rate? number Rate of the gripper; 1 is the whole stroke in a second. Expects a number (1/s) above 0. Default 0.5.
+---@field rate? number Rate of the gripper: 1 is the whole stroke in a second, 5 the speed of the fingers. Expects a number (1/s) in 0.001..5. Default 0.5.
 ---@field closure? number Closure at the end. Expects a number in 0..1. Default 0.
 
 ---The goal of a task.
@@ -1545,7 +1545,7 @@ function Arm:reaches(pose) end
 ---@param seconds number
 function Arm:wait(seconds) end
 
----Notes a number, such as the width of a grip, in the episode's record and in the manifest of a dataset.
+---Notes a number, such as the width of a grip, in the episode's record and in the manifest of a dataset. A further note of the same name replaces it.
 ---@param name string
 ---@param value number
 function Arm:note(name, value) end

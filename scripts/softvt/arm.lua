@@ -159,6 +159,17 @@ function Arm:grasp(closure, options)
   if options.width and options.force then
     check.refuse("arm:grasp: closing stops at options.width or at options.force; give one of them")
   end
+  local least = host.stroke * (1 - closure)
+  if options.width and options.width < least - 1e-9 then
+    check.refuse(
+      ("arm:grasp: closing ends at a closure of %g, %g mm wide, and never reaches options.width, %g mm; close to %.3g or more"):format(
+        closure,
+        1e3 * least,
+        1e3 * options.width,
+        1 - options.width / host.stroke
+      )
+    )
+  end
   if fingers.servo then return feel(self) end
   if options.width or options.force then return close_until(self, closure, options) end
   self:close_to(closure, options)

@@ -19,9 +19,15 @@ use super::{
 };
 use crate::{
     schema::{ApiObject, Constructed, Range, Type, class, function::arguments, functions, output},
-    vm::{base_library, error::fail, library::embedded, privilege::check_privilege, value::number},
+    vm::{
+        base_library,
+        error::{SourceLine, author_line, fail, fail_at, placed},
+        library::embedded,
+        privilege::check_privilege,
+        value::number,
+    },
 };
-use softvt_common::parallel::lock;
+use softvt_common::{parallel::lock, text::unknown_name};
 use softvt_geometry::Pose;
 use softvt_robot::{Obstacle, clearance, gripper::MAX_WIDTH};
 use softvt_scene::{Asset, Body};
@@ -40,11 +46,16 @@ type SharedNotes = Arc<Mutex<BTreeMap<String, f64>>>;
 type SharedReadings = Arc<Mutex<Option<FingerReadings>>>;
 type SharedView = Arc<Mutex<ExpertView>>;
 
+/// The line where a function of a script begins.
+fn defined_line(function: &Function) -> Option<SourceLine> {
+    let info = function.info();
+    let file = info.source?.strip_prefix('@')?.to_owned();
+    Some(SourceLine { file, line: info.line_defined? })
+}
+
 /// `file:line` where a function of a script begins.
 pub(crate) fn defined_at(function: &Function) -> String {
-    let info = function.info();
-    let file = info.source.as_deref().and_then(|source| source.strip_prefix('@')).unwrap_or("the script");
-    info.line_defined.map_or(file.to_owned(), |line| format!("{file}:{line}"))
+    defined_line(function).map_or("the script".to_owned(), |line| line.to_string())
 }
 
 /// An expert as a coroutine of any virtual machine.
@@ -127,8 +138,9 @@ impl Coroutine {
             (Some(pose_w), Some(closure), Some(gripping)) => {
                 Ok(Some(ExpertCommand { pose_b: view.base_w.inv_mul(&pose_w), closure, gripping, goal_b }))
             }
-            _ => Err(fail(
+            _ => Err(fail_at(
                 lua,
+                defined_line(&self.function),
                 "the expert yielded something that is not a command; use arm:command, arm:move_to, arm:wait … instead \
                  of coroutine.yield",
             )),
@@ -171,20 +183,22 @@ impl Coroutine {
     /// Raises `complaint` where the script waits; `None` if it does not wait.
     fn raise(&self, complaint: &str) -> Option<mlua::Result<MultiValue>> {
         let waiting = self.waiting().filter(|_| self.gave_up.is_none())?;
-        Some(waiting.resume(complaint))
+        Some(waiting.resume(complaint).map_err(|error| placed(error, defined_line(&self.function))))
     }
 
     fn resume(&mut self, lua: &Lua, view: &ExpertView) -> mlua::Result<MultiValue> {
         if let Some((thread, shared)) = &self.running {
             *lock(shared) = view.clone();
-            return if thread.is_resumable() { thread.resume(()) } else { Ok(MultiValue::new()) };
+            let resumed = if thread.is_resumable() { thread.resume(()) } else { Ok(MultiValue::new()) };
+            return resumed.map_err(|error| placed(error, defined_line(&self.function)));
         }
         let view = Arc::new(Mutex::new(view.clone()));
         let host = lua.create_userdata(MeasuredArm(view.clone()))?;
         let arm = arm(lua, &host, finger_access(lua, self.access, &self.readings)?, &self.notes)?;
         let thread = lua.create_thread(self.function.clone())?;
         let (thread, view) = self.running.insert((thread, view));
-        thread.resume((arm, SceneState(view.clone())))
+        let resumed = thread.resume((arm, SceneState(view.clone())));
+        resumed.map_err(|error| placed(error, defined_line(&self.function)))
     }
 }
 
@@ -249,8 +263,9 @@ fn checks(lua: &Lua) -> mlua::Result<Table> {
 }
 
 const CLOSURE: Type = Type::Number("", Range::closed(0.0, 1.0));
-/// Rate of the gripper; 1 is the whole stroke in a second.
-const RATE: Type = Type::Number("1/s", Range::POSITIVE);
+/// Rate of the gripper, up to the speed of its fingers (robot.gripper.speed, 0.2 m/s each): faster commands would end
+/// before the hand has moved. Below the lowest rate the whole stroke takes more than a quarter of an hour.
+const RATE: Type = Type::Number("1/s", Range::closed(1e-3, 5.0));
 /// Largest speed and angular speed of the tool, m/s and rad/s: four times the limits of the real arm (Franka Control
 /// Interface documentation, Robot and interface specifications: Cartesian space limits). Above them, the unit is likely
 /// wrong.
@@ -276,12 +291,12 @@ mod options {
         }
         /// Options of closing and opening.
         RateOptions: "softvt.RateOptions" as "arm:close_to" {
-            /// Rate of the gripper; 1 is the whole stroke in a second.
+            /// Rate of the gripper: 1 is the whole stroke in a second, 5 the speed of the fingers.
             rate: f64 = RATE => Number(0.5);
         }
         /// Options of closing on an object.
         GraspOptions: "softvt.GraspOptions" as "arm:grasp" {
-            /// Rate of the gripper; 1 is the whole stroke in a second.
+            /// Rate of the gripper: 1 is the whole stroke in a second, 5 the speed of the fingers.
             rate: f64 = RATE => Number(0.5);
             /// Measured distance of the gels at which closing stops. A tactile servo ignores it.
             width: Option<f64> = Type::Number("m", Range::closed(0.0, MAX_WIDTH));
@@ -290,7 +305,7 @@ mod options {
         }
         /// Options of releasing an object.
         ReleaseOptions: "softvt.ReleaseOptions" as "arm:release" {
-            /// Rate of the gripper; 1 is the whole stroke in a second.
+            /// Rate of the gripper: 1 is the whole stroke in a second, 5 the speed of the fingers.
             rate: f64 = RATE => Number(0.5);
             /// Closure at the end.
             closure: f64 = CLOSURE => Number(0.0);
@@ -381,7 +396,8 @@ class! {
             fn reaches(pose: LuaPose) -> ["boolean", "number"];
             /// Holds the last command for a time.
             fn wait(seconds: f64 = Type::Number("s", Range::closed(0.0, 600.0))) -> [];
-            /// Notes a number, such as the width of a grip, in the episode's record and in the manifest of a dataset.
+            /// Notes a number, such as the width of a grip, in the episode's record and in the manifest of a dataset. A
+            /// further note of the same name replaces it.
             fn note(name: String = Type::Name, value: f64 = Type::Number("", Range::ANY)) -> [];
             /// Ends the expert. The last command stays, and the episode's record and the results contain the reason.
             fn give_up(reason: String) -> [];
@@ -493,6 +509,10 @@ class! {
             fn part(lua, this, object: String, part: String) -> ["softvt.ObjectState"] {
                 let view = lock(&this.0);
                 let whole = find(lua, "scene", "object", &view.objects, &object)?;
+                if whole.parts.is_empty() {
+                    let message = format!("scene: {object} has no parts, which softvt.articulated has");
+                    return Err(fail_at(lua, author_line(lua), message));
+                }
                 object_state(lua, find(lua, "scene", "part", &whole.parts, &part)?)?
             }
             /// Returns the states of all objects, in the order of the scene.
@@ -543,7 +563,10 @@ fn find<'a>(
     name: &str,
 ) -> mlua::Result<&'a ObjectView> {
     let names = all.iter().map(|object| object.name.as_str());
-    Ok(&all[index_of(lua, label, what, names, name)?])
+    all.iter().find(|object| object.name == name).ok_or_else(|| {
+        // Of the script's author, also where an expert of the library looks for it.
+        fail_at(lua, author_line(lua), format!("{label}: {}", unknown_name(what, name, names)))
+    })
 }
 
 output! {

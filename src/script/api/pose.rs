@@ -3,7 +3,10 @@
 use nalgebra::Quaternion;
 
 use super::scene::YAW;
-use crate::schema::{Range, Type, check::MIN_LENGTH, class, functions};
+use crate::{
+    schema::{Range, Type, check::MIN_LENGTH, class, functions},
+    vm::error::fail,
+};
 use softvt_geometry::{Pose, Quat, Vec3};
 use softvt_robot::rotation;
 
@@ -56,14 +59,19 @@ functions! {
     FUNCTIONS {
         /// Returns a pose in the world frame: `softvt.pose { position = { 0.4, 0, 0.2 }, yaw = math.pi / 2 }`. Without
         /// a quaternion the hand points straight down.
-        fn pose(_) takes spec "softvt.PoseSpec" {
+        fn pose(lua) takes spec "softvt.PoseSpec" {
             /// Position.
             position: [f64; 3] = POSITION;
-            /// Rotation of the downward hand about the vertical.
-            yaw: f64 = YAW => Number(0.0);
+            /// Rotation of the downward hand about the vertical, by default 0.
+            yaw: Option<f64> = YAW;
             /// Orientation instead of yaw.
             quaternion: Option<[f64; 4]> = Type::Quaternion("");
         } -> ["softvt.Pose"] {
+            if yaw.is_some() && quaternion.is_some() {
+                let message = "softvt.pose: quaternion gives the whole orientation, also the yaw; give one of them";
+                return Err(fail(lua, message));
+            }
+            let yaw = yaw.unwrap_or_default();
             let rotation = quaternion.and_then(rotation_from_wxyz).unwrap_or_else(|| downward(yaw));
             LuaPose(Pose::from_parts(Vec3::from(position).into(), rotation))
         }

@@ -65,8 +65,10 @@ fn view() -> ExpertView {
     }
 }
 
+/// An expert that can call functions of the library's `places`.
 fn expert(body: &str) -> (Project, ExpertController) {
-    let project = project(&format!("return suite(function(arm, scene) {body} end)"));
+    let places = "local places = require 'experts.places'";
+    let project = project(&format!("{places} return suite(function(arm, scene) {body} end)"));
     let loaded = project.load("x.lua", &[]).unwrap();
     let setup = EpisodeSetup::open(&loaded, &episode_id(0, 1), &SceneChanges::default()).unwrap();
     (project, setup.expert(ExpertGrip::Commanded).unwrap())
@@ -345,8 +347,41 @@ fn an_expert_that_fails_is_reported_with_its_line() {
     assert_eq!(error("local x = nil .. 1"), format!("x.lua:{line}: attempt to concatenate a nil value"));
     assert_eq!(
         error("coroutine.yield(3)"),
-        "x.lua: the expert yielded something that is not a command; use arm:command, arm:move_to, arm:wait … instead of \
-         coroutine.yield"
+        format!(
+            "x.lua:{line}: the expert yielded something that is not a command; use arm:command, arm:move_to, arm:wait … \
+             instead of coroutine.yield"
+        )
+    );
+    assert_eq!(
+        error("return arm:move_by({ 0, 0, 0.01 }, { speed = 100 })"),
+        format!("x.lua:{line}: arm:move_by.speed: expected a number (m/s) in above 0..6.8, got 100"),
+        "a tail call"
+    );
+    assert_eq!(
+        error("arm:open { rate = 1e9 }"),
+        format!("x.lua:{line}: arm:open.rate: expected a number (1/s) in 0.001..5, got 1e9")
+    );
+    assert_eq!(
+        error("arm:grasp(0.2, { width = 0.03 })"),
+        format!(
+            "x.lua:{line}: arm:grasp: closing ends at a closure of 0.2, 64 mm wide, and never reaches options.width, 30 mm; \
+             close to 0.625 or more"
+        )
+    );
+    assert_eq!(
+        error("softvt.pose { position = { 0, 0, 0.2 }, yaw = 1, quaternion = { 0, 1, 0, 0 } }"),
+        format!(
+            "x.lua:{line}: softvt.pose: quaternion gives the whole orientation, also the yaw; give one of them"
+        )
+    );
+    assert_eq!(
+        error("scene:part('ball', 'knob')"),
+        format!("x.lua:{line}: scene: ball has no parts, which softvt.articulated has")
+    );
+    assert_eq!(
+        error("local _ = places.state(scene, 'bal')"),
+        format!("x.lua:{line}: scene: unknown object \"bal\"; did you mean \"ball\"?"),
+        "not at a line of the library"
     );
     assert_eq!(
         error("while true do end"),

@@ -233,6 +233,18 @@ pub(crate) fn author_line(lua: &Lua) -> Option<SourceLine> {
     own.or(outermost)
 }
 
+/// The error, at `place` if it is one of the host without a line: a tail call leaves no line on the stack.
+pub(crate) fn placed(error: mlua::Error, place: Option<SourceLine>) -> mlua::Error {
+    let host_error = match root(&error) {
+        mlua::Error::ExternalError(inner) => inner.downcast_ref::<ScriptError>(),
+        _ => None,
+    };
+    match host_error.filter(|raised| raised.line.is_none()) {
+        Some(raised) => mlua::Error::external(raised.clone().at(place)),
+        None => error,
+    }
+}
+
 /// An error at the line of the script that is running.
 pub(crate) fn fail(lua: &Lua, message: impl Into<String>) -> mlua::Error {
     fail_at(lua, current_line(lua), message)
