@@ -67,7 +67,7 @@
 ---@class softvt.Near
 ---@field object string Scene name of the object.
 ---@field target string Scene name of the target, or of a part of it.
----@field distance? number Largest distance. Expects metres in 0..10. Default 0.15.
+---@field distance? number Largest distance. Expects metres in 0.001..1.5. Default 0.15.
 ---@field hold_s? number Time that it must stay there. Expects seconds in 0..10. Default 0.4.
 
 ---The object is beside the target, within 45° of a direction of the robot's base, and the robot does not touch it, for a time.
@@ -75,7 +75,7 @@
 ---@field side "left_of"|"right_of"|"in_front_of"|"behind" Side of the target: "left_of" (+y of the base), "right_of", "in_front_of" (nearer to the robot, −x) or "behind".
 ---@field object string Scene name of the object.
 ---@field target string Scene name of the target, or of a part of it.
----@field distance? number Smallest distance of the centres in that direction. Expects metres in 0..10. Default 0.05.
+---@field distance? number Smallest distance of the centres in that direction. Expects metres in 0..1.5. Default 0.05.
 ---@field hold_s? number Time that it must stay there. Expects seconds in 0..10. Default 0.4.
 
 ---The z axis of the object is upright, and the robot does not touch the object, for a time.
@@ -1896,6 +1896,14 @@ function softvt.force_at(sweep, width_mm) end
 ---@param suite softvt.Suite
 ---@return softvt.Instances
 function softvt.instances(suite) end
+
+---Has the objects that an expert names checked in every scene in which its task runs, and returns the expert: `return softvt.check_names("nudge", run, spec, { object = "object" })`. The kinds of the fields of `spec` are "object" (one that moves), "place" (an object or a part), "joint" (a part, cabinet.top_drawer) and "value of joint" (a number in the range of the joint that the field `joint` names). Experts in `spec` are checked as well. softvt check reports a wrong name at the line where the expert was made.
+---@param label string
+---@param expert fun(arm: softvt.Arm, scene: softvt.SceneState)
+---@param spec table
+---@param kinds table<string, string>
+---@return fun(arm: softvt.Arm, scene: softvt.SceneState)
+function softvt.check_names(label, expert, spec, kinds) end
 
 ---Returns an image of one colour: `softvt.image { width = 640, height = 480, colour = { 255, 255, 255 } }`.
 ---@param spec softvt.NewImage

@@ -139,7 +139,7 @@ local function close(arm, scene, spec)
   end
 end
 
-return function(spec)
+local function make(_, spec)
   softvt.check_fields("drawer", spec, FIELDS)
   local full = {
     joint = spec.joint,
@@ -152,7 +152,7 @@ return function(spec)
   if full.speed <= 0 or full.speed > 0.3 then
     error(("drawer: speed: expected m/s in 0..0.3, above 0, got %g"):format(full.speed), 2)
   end
-  return function(arm, scene)
+  local function run(arm, scene)
     local home = arm.target.position
     local move = spec.close and close or open
     move(arm, scene, full)
@@ -163,4 +163,7 @@ return function(spec)
       arm:give_up(("%s ends at %.3f after %d attempts"):format(full.joint, part.joint, ATTEMPTS))
     end
   end
+  return softvt.check_names("drawer", run, full, { joint = "joint" })
 end
+
+return setmetatable({}, { __name = "drawer", __call = make })

@@ -150,13 +150,17 @@ local function stroke(arm, scene, spec, home)
   posture.down(arm, home)
 end
 
-return function(spec)
+local function make(_, spec)
   softvt.check_fields("knob", spec, FIELDS)
   local full = { joint = spec.joint, angle = spec.angle, speed = spec.speed or SPEED }
+  if math.abs(full.angle) > 2 * math.pi then
+    local expected = "radians up to a full turn"
+    error(("knob: angle: expected %s, got %g; math.rad converts degrees"):format(expected, full.angle), 2)
+  end
   if full.speed <= 0 or full.speed > 2.5 then
     error(("knob: speed: expected rad/s in 0..2.5, above 0, got %g"):format(full.speed), 2)
   end
-  return function(arm, scene)
+  local function run(arm, scene)
     local home = arm.target.position
     posture.down(arm, home)
     for _ = 1, STROKES do
@@ -168,4 +172,7 @@ return function(spec)
       arm:give_up(("%s ends at %.2f rad after %d strokes"):format(full.joint, at, STROKES))
     end
   end
+  return softvt.check_names("knob", run, full, { joint = "joint", angle = "value of joint" })
 end
+
+return setmetatable({}, { __name = "knob", __call = make })

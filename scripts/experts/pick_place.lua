@@ -232,17 +232,17 @@ local function complete(spec)
     refuse("share", ("a share in %g..%g, so that the part is within the window"):format(room, 1 - room))
   end
   if full.stop ~= "width" and full.stop ~= "touch" then refuse("stop", '"width" or "touch"') end
-  if full.to then places.check("pick_place", full, 4) end
   if full.distance and not full.to then refuse("distance", "nothing without `to`, which places beside the target") end
+  places.check("pick_place", full, 4)
   if full.to and full.stack then refuse("stack", "nothing beside `to`, which places beside the target") end
-  if full.closing_speed <= 0 or full.closing_speed > 0.2 then refuse("closing_speed", "m/s in 0..0.2, above 0") end
+  if full.closing_speed < 1e-4 or full.closing_speed > 0.2 then refuse("closing_speed", "m/s in 0.0001..0.2") end
   return full
 end
 
-return function(spec)
+local function make(_, spec)
   softvt.check_fields("pick_place", spec, FIELDS)
   spec = complete(spec)
-  return function(arm, scene)
+  local function run(arm, scene)
     local pace = (spec.speed or 1) * (1 + spread(SPEED_SPREAD))
     local share = spec.share + spread(0.5 * spec.window)
     local problem = grasp.problem(scene:object(spec.object))
@@ -267,4 +267,7 @@ return function(spec)
     end
     arm:give_up(("%s %s (%d attempts)"):format(spec.object, reason, ATTEMPTS))
   end
+  return softvt.check_names("pick_place", run, spec, { object = "object", target = "place" })
 end
+
+return setmetatable({}, { __name = "pick_place", __call = make })

@@ -9,6 +9,8 @@ local DIRECTIONS = {
   in_front_of = { -1, 0, 0 },
   behind = { 1, 0, 0 },
 }
+-- Largest distance of two centres, m.
+local MAX_DISTANCE = 1
 -- Space between an object and its neighbour where no distance is given, m.
 local SPACE = 0.015
 
@@ -27,13 +29,21 @@ function places.half_extent(object, direction)
   return (math.abs(x) * object.size[1] + math.abs(y) * object.size[2]) / 2
 end
 
--- Raises an error of the expert `name` if the field `to` of a specification is not a place; `level` is that of error.
+-- Raises an error of the expert `name` if the fields `to`, `distance` and `target` of a specification are not a place
+-- beside another object; `level` is that of error.
 function places.check(name, spec, level)
-  if spec.to ~= "near" and not DIRECTIONS[spec.to] then
+  if spec.target == spec.object then
+    error(('%s: target: is "%s", the object itself; name another'):format(name, spec.target), level)
+  end
+  if spec.to and spec.to ~= "near" and not DIRECTIONS[spec.to] then
     error(
       ('%s: to: expected "near", "left_of", "right_of", "in_front_of" or "behind", got "%s"'):format(name, spec.to),
       level
     )
+  end
+  if spec.distance and not (spec.distance > 0 and spec.distance <= MAX_DISTANCE) then
+    local expected = ("metres in 0..%g, above 0"):format(MAX_DISTANCE)
+    error(("%s: distance: expected %s, got %g"):format(name, expected, spec.distance), level)
   end
 end
 

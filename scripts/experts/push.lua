@@ -73,7 +73,7 @@ local function attempt(arm, scene, spec, place)
   arm:release { closure = 0.5, rate = 1 }
 end
 
-return function(spec)
+local function make(_, spec)
   softvt.check_fields("push", spec, FIELDS)
   local full = {
     object = spec.object,
@@ -86,7 +86,7 @@ return function(spec)
   if full.speed <= 0 or full.speed > 0.3 then
     error(("push: speed: expected m/s in 0..0.3, above 0, got %g"):format(full.speed), 2)
   end
-  return function(arm, scene)
+  local function run(arm, scene)
     local place, problem = places.beside(scene, full)
     if not place then arm:give_up(problem) end
     local function missing() return length(between(scene:object(full.object).centre, place)) end
@@ -99,4 +99,7 @@ return function(spec)
       arm:give_up(("%s stays %.0f mm from its place after %d pushes"):format(full.object, 1e3 * missing(), ATTEMPTS))
     end
   end
+  return softvt.check_names("push", run, full, { object = "object", target = "place" })
 end
+
+return setmetatable({}, { __name = "push", __call = make })

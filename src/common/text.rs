@@ -64,6 +64,7 @@ pub fn unknown_name<'a>(
     let known = known.into_iter();
     match suggest(word, known.clone()) {
         Some(close) => format!("unknown {what} {word:?}; did you mean {close:?}?"),
+        None if known.clone().next().is_none() => format!("unknown {what} {word:?}; there is none"),
         None => format!("unknown {what} {word:?}; there are {}", known.collect::<Vec<_>>().join(", ")),
     }
 }

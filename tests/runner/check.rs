@@ -180,6 +180,101 @@ fn implausible_units_and_wide_objects_are_doubted() {
 }
 
 #[test]
+fn joints_in_other_units_and_parts_away_from_their_object_are_doubted() {
+    let of = |part: &str, joint: &str| {
+        let chest = format!(
+            "local slab = softvt.shape.box {{ size = {{ 0.1, 0.1, 0.02 }} }}\n\
+             local chest = softvt.asset {{ name = 'chest', shape = slab:grounded(), body = softvt.articulated {{ parts = {{\n\
+             {{ name = 'tray', shape = slab:translate({part}), density = 500, joint = {joint} }} }} }} }}\nlocal layout"
+        );
+        let text = Small::default().text().replacen("local layout", &chest, 1);
+        let text = text.replace(
+            "at = { 0, 0.1 } }",
+            "at = { 0, 0.1 } } scene:add { name = 'chest', asset = chest, at = { 0.2, -0.2 } }",
+        );
+        warnings(&Project::new(&[("x.lua", &text)]))
+    };
+    let slider = |rest: &str| {
+        of("0, 0, 0.04", &format!("softvt.slider {{ axis = {{ -1, 0, 0 }}, lower = 0, {rest} }}"))
+    };
+    assert!(!slider("upper = 0.1, friction = 1, damping = 6").contains("chest"));
+    let long = slider("upper = 100, friction = 1e6");
+    assert!(
+        long.contains(
+            "asset chest: part tray: its slider moves from 0 to 100 m, and the object is 100 mm long"
+        ),
+        "{long}"
+    );
+    assert!(long.contains("asset chest: part tray: its friction is 1000000 N"), "{long}");
+    let hinge = of(
+        "0, 0, 0.04",
+        "softvt.hinge { axis = { 1, 0, 0 }, origin = { 0, 80, 0 }, lower = 0, upper = 1, damping = 1e9 }",
+    );
+    assert!(hinge.contains("part tray: the origin of its hinge, (0, 80, 0) m, is 79950 mm away"), "{hinge}");
+    assert!(hinge.contains("part tray: its damping takes 600000000 N m at 0.6 rad/s"), "{hinge}");
+    let away = of("0.6, 0, 0.04", "softvt.slider { axis = { -1, 0, 0 }, lower = 0, upper = 0.1 }");
+    assert!(away.contains("part tray: it is 500."), "{away}");
+}
+
+#[test]
+fn a_goal_held_for_longer_than_the_budget_is_doubted() {
+    let text = Small::default().text().replacen(
+        "local floor",
+        "local opt = softvt.options { hold_s = { default = 9.99 } }\nlocal floor",
+        1,
+    );
+    let text = text.replace("target = \"post\" }", "target = \"post\", hold_s = opt.hold_s }");
+    let found = warnings(&Project::new(&[("x.lua", &text)]));
+    assert!(found.contains("task 0: the goal must hold for 9.99 s, and the budget is 2 s"), "{found}");
+}
+
+/// A project whose task has this expert, in line 12, with the standard experts at hand.
+fn with_expert(expert: &str) -> Project {
+    let makers = ["drawer", "knob", "pick_place", "push", "sequence"];
+    let text = Small::default().text().replacen(
+        "local floor",
+        &format!(
+            "{} local floor",
+            makers.map(|name| format!("local {name} = require 'experts.{name}'")).join(" ")
+        ),
+        1,
+    );
+    Project::new(&[(
+        "x.lua",
+        &text.replace("expert = function(arm, scene) arm:wait(1) end", &format!("expert = {expert}")),
+    )])
+}
+
+#[test]
+fn standard_experts_are_checked_where_they_are_made() {
+    let refused = |expert: &str| refusal(&with_expert(expert));
+    assert_snapshot!(refused("pick_place"), @"x.lua:12: task.expert: expected a function, fun(arm: softvt.Arm, scene: softvt.SceneState), got pick_place, which makes one; call it: pick_place { … }");
+    assert_snapshot!(refused("sequence { pick_place }"), @"x.lua:12: sequence: [1]: expected an expert, a function, got pick_place, which makes one; call it: pick_place { … }");
+    assert_snapshot!(refused("pick_place { object = 'cube', target = 'cube' }"), @r#"x.lua:12: pick_place: target: is "cube", the object itself; name another"#);
+    assert_snapshot!(refused("push { object = 'cube', target = 'floor', distance = 135 }"), @"x.lua:12: push: distance: expected metres in 0..1, above 0, got 135");
+    assert_snapshot!(refused("push { object = 'cube', target = 'floor', distance = -0.1 }"), @"x.lua:12: push: distance: expected metres in 0..1, above 0, got -0.1");
+    assert_snapshot!(refused("knob { joint = 'cube.knob', angle = 36 }"), @"x.lua:12: knob: angle: expected radians up to a full turn, got 36; math.rad converts degrees");
+    with_expert("pick_place { object = 'cube', target = 'post' }").run("x.lua").check().expect("valid");
+}
+
+#[test]
+fn names_of_standard_experts_are_checked_in_the_scene() {
+    let refused = |expert: &str| refusal(&with_expert(expert));
+    assert_snapshot!(refused("pick_place { object = 'cub', target = 'post' }"), @r#"x.lua:12: pick_place.object: unknown object "cub"; did you mean "cube"?"#);
+    assert_snapshot!(refused("sequence { push { object = 'cube', target = 'post' },\npick_place {\nobject = 'cube', target = 'pst' } }"), @r#"x.lua:14: pick_place.target: unknown object "pst"; did you mean "post"?"#);
+    assert_snapshot!(refused("push { object = 'floor', target = 'post' }"), @r#"x.lua:12: push.object: "floor" never moves; name an object whose body is softvt.soft or softvt.rigid"#);
+    assert_snapshot!(refused("knob { joint = 'cube.knob', angle = 1 }"), @r#"x.lua:12: knob.joint: unknown joint "cube.knob"; cube has no parts, which softvt.articulated has"#);
+    let stove = |angle: &str| {
+        let text = with_expert(&format!("knob {{ joint = 'stove.knob', angle = {angle} }}")).text("x.lua");
+        let text = text.replacen("local floor", "local stove = require 'assets.flat_stove' local floor", 1);
+        let add = "at = { 0, 0.1 } } scene:add { name = 'stove', asset = stove, at = { 0.2, -0.25 } }";
+        Project::new(&[("x.lua", &text.replace("at = { 0, 0.1 } }", add))])
+    };
+    stove("1").run("x.lua").check().expect("valid");
+    assert_snapshot!(refusal(&stove("-3")), @"x.lua:12: knob.angle: expected a value of stove.knob in 0..4.71238898038469 (rad), got -3");
+}
+
+#[test]
 fn a_first_step_that_holds_at_the_start_is_a_warning() {
     let on = "softvt.on { object = \"cube\", target = \"post\" }";
     let of = |steps: &str| {

@@ -26,7 +26,12 @@ choice! {
 
 const HOLD: Type = Type::Number("s", Range::closed(0.0, 10.0));
 const SHARE: Type = Type::Number("", Range::closed(0.0, 1.0));
-const DISTANCE: Type = Type::Number("m", Range::closed(0.0, 10.0));
+/// Largest distance of two objects in a goal, m: about that of the ends of the workspace.
+const MAX_DISTANCE: f64 = 1.5;
+/// Distance beyond which an object is beside another.
+const BEYOND: Type = Type::Number("m", Range::closed(0.0, MAX_DISTANCE));
+/// Distance within which an object is near another. No two centres are nearer than a millimetre for long.
+const WITHIN: Type = Type::Number("m", Range::closed(1e-3, MAX_DISTANCE));
 /// Type of the parts of a combination. It names no constructors, since those of combinations would name themselves; the
 /// functions that make combinations check their arguments.
 const GOALS: Type = Type::List(&Type::Table("softvt.Goal"));
@@ -89,7 +94,7 @@ record! {
         /// Scene name of the target, or of a part of it.
         target: String;
         /// Largest distance.
-        distance: f64 = DISTANCE => Number(0.15);
+        distance: f64 = WITHIN => Number(0.15);
         /// Time that it must stay there.
         hold_s: f64 = HOLD => Number(0.4);
     }
@@ -104,7 +109,7 @@ record! {
         /// Scene name of the target, or of a part of it.
         target: String;
         /// Smallest distance of the centres in that direction.
-        distance: f64 = DISTANCE => Number(0.05);
+        distance: f64 = BEYOND => Number(0.05);
         /// Time that it must stay there.
         hold_s: f64 = HOLD => Number(0.4);
     }
@@ -245,6 +250,15 @@ pub(crate) struct DeclaredPredicate {
     pub table: Table,
     /// Its function, if it is [`Goal::Predicate`].
     pub function: Option<Function>,
+    /// True if it is one of several of a `softvt.stacked`.
+    pub is_stacked: bool,
+}
+
+impl DeclaredPredicate {
+    /// The field of its table that names `field`, "object" or "target": both are in the list of `softvt.stacked`.
+    pub(crate) fn field(&self, field: &'static str) -> &'static str {
+        if self.is_stacked { "objects" } else { field }
+    }
 }
 
 impl GoalSpec {
@@ -291,6 +305,7 @@ impl GoalSpec {
                 goal: goal.clone(),
                 table: table.clone(),
                 function: function.clone(),
+                is_stacked: matches!(self, Self::Stacked(_)),
             });
             goal
         };
@@ -298,6 +313,14 @@ impl GoalSpec {
             if spec.objects.len() < 2 {
                 let message =
                     "task.goal.objects: expected at least two objects, from the lowest on".to_owned();
+                return Err(fail_at_key(lua, &table, "objects", message));
+            }
+            let is_twice = |at: &usize| spec.objects[..*at].contains(&spec.objects[*at]);
+            if let Some(twice) = (1..spec.objects.len()).find(is_twice) {
+                let message = format!(
+                    "task.goal.objects: names {:?} twice; give each object once",
+                    spec.objects[twice]
+                );
                 return Err(fail_at_key(lua, &table, "objects", message));
             }
             let on = |pair: &[String]| declare(Goal::On(placement(&pair[1], &pair[0], spec.hold_s)));

@@ -8,6 +8,7 @@ pub(crate) mod envelope_plot;
 pub(crate) mod experiment_input;
 pub(crate) mod expert;
 pub(crate) mod expert_input;
+pub(crate) mod expert_names;
 pub(crate) mod goals;
 pub(crate) mod image;
 pub(crate) mod joints;
@@ -127,6 +128,7 @@ pub(crate) fn functions() -> impl Iterator<Item = &'static Function> {
         simulation::FUNCTIONS,
         envelope::FUNCTIONS,
         expert::FUNCTIONS,
+        expert_names::FUNCTIONS,
         image::FUNCTIONS,
         plots::FUNCTIONS,
         pose::FUNCTIONS,

@@ -12,6 +12,7 @@ use crate::{
     api::{
         envelope::draw,
         expert_input::SuiteInstances,
+        expert_names::{check_expert, joint_range, movable_object},
         goals::DeclaredPredicate,
         random::LuaRng,
         scene::{LuaScene, empty_scene},
@@ -26,6 +27,7 @@ use crate::{
 };
 use softvt_benchmark::{
     Shift, ShiftValue, Suite,
+    goal_conflict::conflict,
     seed::{EpisodeSeed, RandomStream, SecretSeed},
     variation::{VariationError, VariationRanges},
 };
@@ -175,7 +177,11 @@ impl SceneBuilder {
         predicates
             .iter()
             .try_for_each(|p| check_predicate(&vm.lua, p, &scene))
+            .and_then(|()| check_joint_ranges(&vm.lua, &task, &scene))
             .map_err(|e| vm.explain(&e))?;
+        if let Some(expert) = &task.expert {
+            check_expert(&vm.lua, expert, &nominal).map_err(|e| vm.explain(&e))?;
+        }
         if task.object.is_some() {
             check_object(&vm.lua, &task.table, "task.object", "object", &object, &scene)
                 .map_err(|e| vm.explain(&e))?;
@@ -454,35 +460,43 @@ pub fn check_shift(shifts: &[Shift], name: &str, value: f64) -> Result<(), Shift
 fn check_predicate(lua: &Lua, predicate: &DeclaredPredicate, scene: &Scene) -> mlua::Result<()> {
     let DeclaredPredicate { goal, table, .. } = predicate;
     if let Some(name) = goal.object() {
-        check_object(lua, table, "task.goal.object", "object", name, scene)?;
+        let key = predicate.field("object");
+        check_object(lua, table, &format!("task.goal.{key}"), key, name, scene)?;
     }
     if let Some(name) = goal.target() {
+        let key = predicate.field("target");
         let known = scene.names();
         let known = known.iter().map(String::as_str);
         if !known.clone().any(|known| known == name) {
-            let message = format!("task.goal.target: {}", unknown_name("object", name, known));
-            return Err(fail_at_key(lua, table, "target", message));
+            let message = format!("task.goal.{key}: {}", unknown_name("object", name, known));
+            return Err(fail_at_key(lua, table, key, message));
         }
         let object = scene.objects.iter().find(|object| object.name == name);
         if let Some(Body::Scenery) = object.map(|object| &object.asset.body) {
             let message = format!(
-                "task.goal.target: {name:?} is softvt.scenery, which has no contact; name an object that has"
+                "task.goal.{key}: {name:?} is softvt.scenery, which has no contact; name an object that has"
             );
-            return Err(fail_at_key(lua, table, "target", message));
+            return Err(fail_at_key(lua, table, key, message));
         }
     }
-    if let Some(name) = goal.joint() {
-        let names = scene.names();
-        let parts = names.iter().map(String::as_str).filter(|name| name.contains('.'));
-        if !parts.clone().any(|part| part == name) {
-            let what = match parts.clone().next() {
-                Some(_) => unknown_name("joint", name, parts),
-                None => format!("unknown joint {name:?}; the scene has no softvt.articulated"),
-            };
-            return Err(fail_at_key(lua, table, "joint", format!("task.goal.joint: {what}")));
-        }
+    if let Some(name) = goal.joint()
+        && let Err(what) = joint_range(scene, name)
+    {
+        return Err(fail_at_key(lua, table, "joint", format!("task.goal.joint: {what}")));
     }
     Ok(())
+}
+
+/// Checks that the predicates of a goal can hold at once, given the ranges of its joints.
+fn check_joint_ranges(lua: &Lua, task: &Constructed<TaskSpec>, scene: &Scene) -> mlua::Result<()> {
+    let (goal, _) = task.goal.plain(lua)?;
+    match conflict(&goal.with_joint_ranges(&|name| Some(joint_range(scene, name).ok()?.limits))) {
+        Some(conflict) => {
+            let message = format!("task.goal: can never be met: {conflict}");
+            Err(fail_at_key(lua, &task.table, "goal", message))
+        }
+        None => Ok(()),
+    }
 }
 
 /// Checks that the object named by the key `key` of `table` exists and can move.
@@ -494,18 +508,5 @@ fn check_object(
     name: &str,
     scene: &Scene,
 ) -> mlua::Result<()> {
-    let wrong = |what: String| Err(fail_at_key(lua, table, key, format!("{label}: {what}")));
-    let mut known = scene.names();
-    // Parts of objects cannot be carried.
-    known.retain(|name| !name.contains('.'));
-    if !known.iter().any(|known| known == name) {
-        return wrong(unknown_name("object", name, known.iter().map(String::as_str)));
-    }
-    let object = scene.objects.iter().find(|object| object.name == name);
-    match object.map(|object| &object.asset.body) {
-        Some(Body::Static | Body::Articulated(_) | Body::Scenery) => {
-            wrong(format!("{name:?} never moves; name an object whose body is softvt.soft or softvt.rigid"))
-        }
-        _ => Ok(()),
-    }
+    movable_object(scene, name).map_err(|what| fail_at_key(lua, table, key, format!("{label}: {what}")))
 }

@@ -30,6 +30,9 @@ impl Type {
                 (Self::Number("rad", _), Some(_)) => {
                     ValidationError::new(format!("{}; math.rad converts degrees", error.message))
                 }
+                (Self::Function(_), _) if let Some(name) = maker_name(value) => {
+                    self.expected(&format!("{name}, which makes one; call it: {name} {{ … }}"))
+                }
                 _ => error,
             }
         };
@@ -138,6 +141,13 @@ impl Type {
             false => Err(ValidationError::new(format!("expected {what}, got one of length 0"))),
         }
     }
+}
+
+/// Name of a table that is called to make a value, such as `experts.pick_place`: the `__name` of its metatable.
+fn maker_name(value: &Value) -> Option<String> {
+    let meta = value.as_table()?.metatable()?;
+    let is_called = meta.raw_get::<Value>("__call").is_ok_and(|call| call.is_function());
+    meta.raw_get::<Option<String>>("__name").ok()?.filter(|_| is_called)
 }
 
 /// True if a text can be part of a path and of a line without harm.
