@@ -150,9 +150,9 @@ def _picture(
             body += _text(NAMES - 16, top + row * (number + 0.5) + 5, name, "end", "" if name in learned else "soft")
         for column, plot in enumerate(pair):
             left = NAMES + column * (PLOT + NUMBERS + GAP)
-            seeds = max(map(len, plot.learned.values()), default=0)
+            seeds = sorted({len(runs) for runs in plot.learned.values()})
             head = f'<tspan class="title">{escape(plot.suite.replace("_", " "))}</tspan>'
-            head += f'<tspan class="soft" dx="8">{seeds} seed{"s" * (seeds > 1)}</tspan>' if seeds else ""
+            head += f'<tspan class="soft" dx="8">{" or ".join(map(str, seeds))} seed{"s" * (seeds[-1] > 1)}</tspan>' if seeds else ""
             body += f'<text x="{left:.1f}" y="{y + 24:.1f}">{head}</text>\n' + _number(left, y + 19, heading, "soft")
             body += "".join(_line(left + PLOT * at, top, left + PLOT * at, base, "grid") for at in ticks)
             for number, name in enumerate(names):

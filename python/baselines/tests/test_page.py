@@ -48,9 +48,13 @@ class Pages(unittest.TestCase):
         drawn = self.pictures(self.docs)
         self.assertIn(">VT: with touch</text>", drawn[0])
         self.assertIn(">expert</text>", drawn[0])
+        self.assertIn(">2 seeds<", drawn[0])
         page.write([], self.docs)
         self.assertEqual((self.docs / "baselines.md").read_text(), text)
         self.assertEqual(self.pictures(self.docs), drawn)
+        shutil.rmtree(self.docs / "baselines" / "one-vo-continuous-s1-r4")
+        page.write([], self.docs)
+        self.assertIn(">1 or 2 seeds<", self.pictures(self.docs)[0])
 
     def test_runs_under_a_condition_are_rows_of_their_own(self):
         for inputs in ("vo", "vt"):
