@@ -24,6 +24,7 @@ import numpy as np
 from websocket import WebSocketBadStatusException, WebSocketException, create_connection
 
 from .binary import find_binary
+from .sources import stamps
 
 PROTOCOL = 1
 """Version of the protocol that this client speaks."""
@@ -278,9 +279,12 @@ class Lease:
 
 
 def lease(script: str, flags: Sequence[str] = (), binary: str | None = None, profile: str | None = None) -> Lease:
-    """The use of a server of `softvt serve script flags…`: one of this process or its parent that runs already, or a new one."""
+    """The use of a server of `softvt serve script flags…`: one of this process or its parent that runs already, or a new one.
+
+    A server has read its files when it started, so that files that were changed since then need another one.
+    """
     program = binary or find_binary()
-    words = json.dumps([program, os.getcwd(), script, [*flags], profile])
+    words = json.dumps([program, os.getcwd(), script, [*flags], profile, stamps(program, script, flags)])
     key = hashlib.sha256(words.encode()).hexdigest()
     with _lock:
         shared = _servers.get(key)

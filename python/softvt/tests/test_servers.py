@@ -13,6 +13,7 @@ from unittest import mock
 import numpy as np
 import softvt
 from softvt import serve
+from softvt.sources import stamps
 from suites_for_tests import FOLDER, short_suite
 
 
@@ -60,6 +61,49 @@ class Servers(unittest.TestCase):
         finally:
             for env in (first, second, other):
                 env.close()
+
+    def test_a_changed_file_of_a_suite_needs_another_server(self):
+        folder = FOLDER / "edited"
+        (folder / "parts").mkdir(parents=True)
+        suite, part = folder / "edited.lua", folder / "parts" / "budget.lua"
+        part.write_text("return 12\n")
+        suite.write_text(
+            'local suite = require "suites.spatial_soft"\n'
+            'for _, task in ipairs(suite.tasks) do task.budget_steps = require("parts.budget") end\nreturn suite\n'
+        )
+
+        def budget():
+            env = softvt.SoftVTEnv(str(suite), obs="proprio", cost=False)
+            self.addCleanup(env.close)
+            return env.hello["suites"][0]["tasks"][0]["budget_steps"], env._client.url
+
+        first = budget()
+        self.assertEqual(budget(), first, "the server is shared")
+        part.write_text("return 13\n")
+        second = budget()
+        self.assertEqual((first[0], second[0]), (12, 13), "a required file has changed")
+        suite.write_text(suite.read_text().replace('require("parts.budget")', "14"))
+        self.assertEqual(budget()[0], 14, "the suite has changed")
+
+    def test_files_that_a_server_reads_have_stamps(self):
+        folder = FOLDER / "stamps"
+        for name, text in {
+            "mine.lua": 'require "lib.deep"; local mesh = "meshes/cup.obj"; require("assets." .. "cup")',
+            "lib/deep.lua": "require('lib/deeper')",
+            "lib/deeper.lua": "",
+            "meshes/cup.obj": "",
+            "assets/cup.lua": "",
+            "profile.lua": "",
+            "other.lua": "",
+        }.items():
+            (folder / name).parent.mkdir(parents=True, exist_ok=True)
+            (folder / name).write_text(text)
+        program = softvt.find_binary()
+        found = stamps(program, str(folder / "mine.lua"), ("--profile", str(folder / "profile.lua"), "--set", "cameras.width=64"))
+        paths = {Path(path) for path, *_ in found}
+        expected = ("mine.lua", "lib/deep.lua", "lib/deeper.lua", "meshes/cup.obj", "assets/cup.lua", "profile.lua")
+        self.assertEqual({path for path in paths if folder in path.parents}, {folder / name for name in expected})
+        self.assertIn(Path(program), paths)
 
     def test_worker_processes_use_the_server_of_their_parent_and_other_programs_do_not(self):
         env = softvt.SoftVTEnv(short_suite(), obs="proprio")
