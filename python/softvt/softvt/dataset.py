@@ -3,14 +3,15 @@
 import json
 import operator
 import os
-from collections.abc import Iterable, Sequence
+import re
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .arguments import require_bool, require_one_of, texts, whole_number
+from .arguments import require_bool, require_one_of, require_text, texts, whole_number
 
 if TYPE_CHECKING:
     import h5py
@@ -23,6 +24,10 @@ JOINT_ACTIONS = "actions_joints"
 
 OBSERVATIONS = ("agentview_rgb", "eye_in_hand_rgb", "state")
 """Streams that an item has by default."""
+
+# Attributes of a demonstration that its line of the manifest has as well.
+_COMPARED = ("num_samples", "task_suite", "task_id", "language", "state_hash")
+_CHECK = "`softvt dataset check` tells more"
 
 
 @dataclass(frozen=True)
@@ -68,6 +73,7 @@ class Dataset:
         horizon: int = 1,
         control: str = "pose",
         gripper: str | None = None,
+        suite: str | None = None,
         task: int | Sequence[int] | None = None,
         safe: bool = False,
     ):
@@ -78,11 +84,13 @@ class Dataset:
             as "privileged/d".
         horizon: number of actions of an item.
         control: motion of the actions, "pose" or "joints".
-        gripper: grip code of the actions; by default that of the recording, as of its exports.
-        task: only these tasks.
+        gripper: grip code of the actions; by default that of the recording, as of its exports. Needed for files of recordings that differ in it.
+        suite: only the demonstrations of this suite.
+        task: only these tasks. Needs `suite` if the recording has several suites.
         safe: True for the safe demonstrations only. By default all that were kept, which are safe unless they were recorded with `--keep goal`.
 
-        Raises ValueError if there is no such stream, no demonstration of one of the tasks, or no safe one, and ImportError without h5py.
+        Raises ValueError if there is no such stream, no demonstration of the suite or of one of the tasks, or no safe one, and if the files
+        contradict themselves or the manifest; ImportError without h5py.
         """
         if gripper is not None:
             require_one_of("gripper", gripper, [*ACTIONS])
@@ -90,6 +98,13 @@ class Dataset:
         require_bool("safe", safe)
         horizon = whole_number("horizon", horizon, 1)
         keys = texts("keys", keys)
+        for key in keys:
+            if not all(key.split("/")):
+                raise ValueError(
+                    f"keys: {key!r}: expected the path of a stream in its demonstration, without / at its ends, such as 'privileged/d'"
+                )
+        if suite is not None:
+            require_text("suite", suite)
         if not isinstance(path, str | os.PathLike):
             raise ValueError(f"path={path!r}: expected the path of a recording")
         self._streams = {key: key if "/" in key else f"obs/{key}" for key in keys}
@@ -97,18 +112,17 @@ class Dataset:
         self._files: dict[Path, h5py.File] = {}
         self._process = os.getpid()
         tasks = None if task is None else _tasks(task)
-        files = _hdf5_files(Path(path))
-        self._actions = ACTIONS[gripper or _recorded_gripper(files[0])]
-        recorded = [demo for file in files for demo in self._read(file)]
+        manifests: dict[Path, list[dict[str, Any]]] = {}
+        recorded = [demo for file in _hdf5_files(Path(path)) for demo in self._read(file, manifests)]
         if not recorded:
             raise ValueError(f"{path}: no demonstration")
-        known = {demo.task for demo in recorded}
-        if tasks is not None and (missing := tasks - known):
-            raise ValueError(f"{path}: no demonstration of task {_listed(missing)}; the recording has those of task {_listed(known)}")
-        chosen = [demo for demo in recorded if tasks is None or demo.task in tasks]
+        chosen = _chosen(path, recorded, suite, tasks)
         self.demonstrations = [demo for demo in chosen if demo.safe or not safe]
         if not self.demonstrations:
             raise ValueError(f"{path}: safe=True: none of the {len(chosen)} demonstrations is safe; leave it out")
+        self._actions = ACTIONS[gripper or _recorded_gripper(dict.fromkeys(demo.file for demo in self.demonstrations))]
+        for demo in self.demonstrations:
+            self._require_streams(demo)
         self._starts = np.cumsum([0, *(demo.steps for demo in self.demonstrations)])
 
     def __len__(self) -> int:
@@ -143,6 +157,19 @@ class Dataset:
         streams = {key: np.asarray(group[stream]) for key, stream in self._streams.items()}
         return {**streams, "actions": self._actions_of(group, slice(None))}
 
+    def stats(self) -> dict[str, dict[str, np.ndarray]]:
+        """Of `actions` and of each requested stream of numbers or vectors, over all steps: `mean`, `std`, `min`, `max`, and the quantiles `q01` and
+        `q99`, each of the shape of a step, float32, for normalisation. Pictures and other arrays are left out."""
+        group = self._group(self.demonstrations[0])
+        keys = [key for key, stream in self._streams.items() if group[stream].ndim <= 2 and group[stream].dtype.kind in "iuf"]
+        steps: dict[str, list[np.ndarray]] = {key: [] for key in ["actions", *keys]}
+        for demo in self.demonstrations:
+            group = self._group(demo)
+            steps["actions"].append(self._actions_of(group, slice(None)))
+            for key in keys:
+                steps[key].append(np.asarray(group[self._streams[key]]))
+        return {key: _statistics(np.concatenate(found).astype(np.float64)) for key, found in steps.items()}
+
     def close(self) -> None:
         """Closes the files. They are opened again when they are needed."""
         for file in self._files.values():
@@ -153,42 +180,43 @@ class Dataset:
         # Open files cannot be sent to the workers of a loader.
         return {**self.__dict__, "_files": {}}
 
-    def _read(self, file: Path) -> list[Demonstration]:
+    def _read(self, file: Path, manifests: dict[Path, list[dict[str, Any]]]) -> list[Demonstration]:
+        """The demonstrations of a file. Raises ValueError if they are not those of its manifest."""
         try:
             data = self._open(file)["data"]
-        except (OSError, KeyError) as error:
+            names = [*data]
+        except (OSError, KeyError, TypeError) as error:
             raise ValueError(f"{file}: no recording of softvt: {str(error).strip(chr(34))}") from error
-        found = []
-        for name in sorted(data, key=lambda name: int(name.removeprefix("demo_"))):
-            group, attrs = data[name], data[name].attrs
-            joints = [JOINT_ACTIONS] if self._control == "joints" else []
-            for stream in [*self._streams.values(), self._actions, *joints]:
-                if stream not in group:
-                    if stream == JOINT_ACTIONS:
-                        raise ValueError(f"{file}: data/{name} has no {stream}: an earlier version of softvt recorded it; record it again")
-                    if stream.removeprefix("obs/") in ACTIONS.values():
-                        raise ValueError(f"keys: {stream.removeprefix('obs/')!r} is no observation; an item has `actions` in any case")
-                    folder = stream.rpartition("/")[0]
-                    folder = folder if folder in group else "obs"
-                    have = ", ".join(sorted(group[folder]))
-                    raise ValueError(f"{file}: data/{name} has no stream {stream}; {folder} has {have}")
-                if below := _streams_below(group, stream):
-                    raise ValueError(f"{file}: data/{name}/{stream} is a group; give one of its streams: {', '.join(below)}")
-            text = {key: _text(attrs[key]) for key in ("task_suite", "language")}
-            numbers = {key: int(attrs[key]) for key in ("num_samples", "task_id", "attempt", "success")}
-            found.append(
-                Demonstration(
-                    file,
-                    name,
-                    numbers["num_samples"],
-                    text["task_suite"],
-                    numbers["task_id"],
-                    text["language"],
-                    numbers["attempt"],
-                    bool(numbers["success"]),
+        if other := [name for name in names if not re.fullmatch(r"demo_\d+", name)]:
+            raise ValueError(f"{file}: data/{other[0]}: not a demonstration, which has a name such as demo_0")
+        lines = _manifest_lines(file, manifests)
+        if lines is not None:
+            if missing := lines.keys() - names:
+                raise ValueError(f"{file}: no data/{min(missing)}, which the manifest names; {_CHECK}")
+            if unknown := names - lines.keys():
+                raise ValueError(f"{file}: data/{min(unknown)} is not in the manifest; {_CHECK}")
+        return [_demonstration(file, data, name, {} if lines is None else lines[name]) for name in sorted(names, key=_number)]
+
+    def _require_streams(self, demo: Demonstration) -> None:
+        """Raises ValueError for a demonstration without one of the streams, or with one of another length."""
+        group, where = self._group(demo), f"{demo.file}: data/{demo.name}"
+        joints = [JOINT_ACTIONS] if self._control == "joints" else []
+        for stream in [*self._streams.values(), self._actions, *joints]:
+            if stream not in group:
+                if stream == JOINT_ACTIONS:
+                    raise ValueError(f"{where} has no {stream}: an earlier version of softvt recorded it; record it again")
+                if stream.removeprefix("obs/") in ACTIONS.values():
+                    raise ValueError(f"keys: {stream.removeprefix('obs/')!r} is no observation; an item has `actions` in any case")
+                folder = stream.rpartition("/")[0]
+                folder = folder if folder in group else "obs"
+                have = ", ".join(sorted(group[folder]))
+                raise ValueError(f"{where} has no stream {stream}; {folder} has {have}")
+            if below := _streams_below(group, stream):
+                raise ValueError(f"{where}/{stream} is a group; give one of its streams: {', '.join(below)}")
+            if group[stream].shape[:1] != (demo.steps,):
+                raise ValueError(
+                    f"{where}/{stream} has the shape {group[stream].shape}, and the demonstration {demo.steps} steps; {_CHECK}"
                 )
-            )
-        return found
 
     def _actions_of(self, group: Any, steps: slice) -> np.ndarray:
         poses = np.asarray(group[self._actions][steps])
@@ -214,8 +242,7 @@ def _hdf5_files(path: Path) -> list[Path]:
     """The HDF5 files of a recording, in order of their names. Raises ValueError if there is none, or if the recording is not complete."""
     if path.is_file():
         return [path]
-    # softvt writes the first file at the start of a recording, and the second at its end.
-    if (path / "recording.json").is_file() and not (path / "dataset.json").is_file():
+    if _is_interrupted(path):
         raise ValueError(
             f"{path}: the recording was interrupted; complete it by its command with --resume (softvt record … --resume --out {path}), or give "
             "the HDF5 file of a task that is complete"
@@ -230,8 +257,61 @@ def _hdf5_files(path: Path) -> list[Path]:
     return found
 
 
-def _recorded_gripper(file: Path) -> str:
-    """The grip code of the recording that an HDF5 file belongs to."""
+def _demonstration(file: Path, data: Any, name: str, line: Mapping[str, Any]) -> Demonstration:
+    """A demonstration of a file with its line of the manifest. Raises ValueError if they, or number and length of its actions, contradict."""
+    group, where = data[name], f"{file}: data/{name}"
+    texts_of, numbers_of = ("task_suite", "language"), ("num_samples", "task_id", "attempt", "success")
+    if missing := [key for key in (*texts_of, *numbers_of) if key not in group.attrs]:
+        raise ValueError(f"{where} has no attribute {missing[0]}; {_CHECK}")
+    if "actions" not in group:
+        raise ValueError(f"{where} has no actions; {_CHECK}")
+    text = {key: _text(group.attrs[key]) for key in texts_of}
+    numbers = {key: int(group.attrs[key]) for key in numbers_of}
+    hashed = {key: _text(group.attrs[key]) for key in ("state_hash",) if key in group.attrs}
+    steps = len(group["actions"])
+    if numbers["num_samples"] != steps:
+        raise ValueError(f"{where}: num_samples is {numbers['num_samples']}, and actions has {steps} steps; {_CHECK}")
+    if steps == 0:
+        raise ValueError(f"{where} has no step; {_CHECK}")
+    for key, found in {**text, **numbers, **hashed}.items():
+        if key in _COMPARED and key in line and line[key] != found:
+            raise ValueError(f"{where}: {key} is {found!r}, and {line[key]!r} in the manifest; {_CHECK}")
+    return Demonstration(
+        file, name, steps, text["task_suite"], numbers["task_id"], text["language"], numbers["attempt"], bool(numbers["success"])
+    )
+
+
+def _chosen(path: object, recorded: list[Demonstration], suite: str | None, tasks: set[int] | None) -> list[Demonstration]:
+    """The demonstrations of a suite and of tasks. Raises ValueError if there is none, or if tasks of several suites have these numbers."""
+    suites = sorted({demo.suite for demo in recorded})
+    if suite is not None and suite not in suites:
+        raise ValueError(f"{path}: no demonstration of suite {suite!r}; the recording has those of {', '.join(suites)}")
+    of_suite = [demo for demo in recorded if suite in (None, demo.suite)]
+    if tasks is None:
+        return of_suite
+    if suite is None and len(suites) > 1:
+        raise ValueError(
+            f"{path}: task={_listed(tasks)}: the recording has demonstrations of the suites {', '.join(suites)}; give suite as well"
+        )
+    known = {demo.task for demo in of_suite}
+    if missing := tasks - known:
+        raise ValueError(f"{path}: no demonstration of task {_listed(missing)}; the recording has those of task {_listed(known)}")
+    return [demo for demo in of_suite if demo.task in tasks]
+
+
+def _recorded_gripper(files: Iterable[Path]) -> str:
+    """The grip code of the recordings that HDF5 files belong to. Raises ValueError if they differ in it."""
+    codes: dict[str | None, Path] = {}
+    for file in files:
+        codes.setdefault(_card_gripper(file), file)
+    if len(codes) > 1:
+        found = "; ".join(f"{file}: {'no dataset.json' if code is None else code}" for code, file in codes.items())
+        raise ValueError(f"the files differ in their grip code ({found}); give gripper, such as gripper='continuous'")
+    return next(iter(codes)) or "continuous"
+
+
+def _card_gripper(file: Path) -> str | None:
+    """The grip code of the recording that an HDF5 file belongs to; None without its card."""
     for folder in file.resolve().parents[:2]:
         card = folder / "dataset.json"
         if card.is_file():
@@ -241,7 +321,7 @@ def _recorded_gripper(file: Path) -> str:
                 raise ValueError(f"{card}: not the file that softvt record wrote: {error}; give gripper to do without it") from error
             require_one_of(f"{card}: gripper", gripper, [*ACTIONS])
             return str(gripper)
-    return "continuous"
+    return None
 
 
 def _streams_below(demo: Any, name: str) -> list[str]:
@@ -255,14 +335,40 @@ def _streams_below(demo: Any, name: str) -> list[str]:
 
 
 def _manifest_files(manifest: Path) -> set[str]:
-    """The HDF5 files that a manifest names. Raises ValueError for a line that names none."""
-    names = set()
-    for number, line in enumerate(manifest.read_text(encoding="utf-8").splitlines(), 1):
+    """The HDF5 files that a manifest names."""
+    return {line["hdf5_path"] for line in _lines(manifest)}
+
+
+def _manifest_lines(file: Path, known: dict[Path, list[dict[str, Any]]]) -> dict[str, dict[str, Any]] | None:
+    """Lines of the manifest about an HDF5 file, by the names of its demonstrations; None without a complete manifest that names the file. `known`
+    keeps the lines of manifests."""
+    for folder in dict.fromkeys([*file.absolute().parents[:2], *file.resolve().parents[:2]]):
+        manifest = folder / "manifest.jsonl"
+        if not manifest.is_file() or _is_interrupted(folder):
+            continue
+        if manifest not in known:
+            known[manifest] = _lines(manifest)
+        names = {name for name in {line["hdf5_path"] for line in known[manifest]} if (folder / name).resolve() == file.resolve()}
+        if names:
+            return {f"demo_{line['demo_id']}": line for line in known[manifest] if line["hdf5_path"] in names}
+    return None
+
+
+def _is_interrupted(folder: Path) -> bool:
+    """True if the recording in a folder is not complete: softvt writes the first file at its start, and the second at its end."""
+    return (folder / "recording.json").is_file() and not (folder / "dataset.json").is_file()
+
+
+def _lines(manifest: Path) -> list[dict[str, Any]]:
+    """Lines of a manifest. Raises ValueError for one that names no demonstration."""
+    found = []
+    for number, text in enumerate(manifest.read_text(encoding="utf-8").splitlines(), 1):
         try:
-            names.add(json.loads(line)["hdf5_path"])
+            line = json.loads(text)
+            found.append({**line, "hdf5_path": str(line["hdf5_path"]), "demo_id": int(line["demo_id"])})
         except (ValueError, KeyError, TypeError) as error:
             raise ValueError(f"{manifest}:{number}: not a line of a manifest: {error}") from error
-    return names
+    return found
 
 
 def _tasks(task: Any) -> set[int]:
@@ -279,6 +385,16 @@ def _tasks(task: Any) -> set[int]:
 
 def _listed(tasks: Iterable[int]) -> str:
     return ", ".join(map(str, sorted(tasks)))
+
+
+def _statistics(steps: np.ndarray) -> dict[str, np.ndarray]:
+    low, high = np.quantile(steps, [0.01, 0.99], axis=0)
+    found = {"mean": steps.mean(0), "std": steps.std(0), "min": steps.min(0), "max": steps.max(0), "q01": low, "q99": high}
+    return {name: np.asarray(value, dtype=np.float32) for name, value in found.items()}
+
+
+def _number(name: str) -> int:
+    return int(name.removeprefix("demo_"))
 
 
 def _text(value: Any) -> str:

@@ -157,6 +157,109 @@ class Datasets(unittest.TestCase):
         np.testing.assert_array_equal(grips(self.folder), grips(folder, gripper="continuous"))
         self.assertFalse(np.array_equal(grips(self.folder), forces))
 
+    def test_files_of_recordings_with_different_grip_codes_need_the_argument(self):
+        files = sorted((self.folder / "hdf5").iterdir())
+        for name, card in (("codes", {"gripper": "force"}), ("cards", None)):
+            mixed, other = FOLDER / name, FOLDER / name / "other"
+            other.mkdir(parents=True)
+            for file, place in zip(files, (mixed / "a.hdf5", other / "b.hdf5")):
+                shutil.copy(file, place)
+            if card is not None:
+                (mixed / "dataset.json").write_text("{}")
+                (other / "dataset.json").write_text(json.dumps(card))
+            else:
+                (other / "dataset.json").write_text("{}")
+            (mixed / "b.hdf5").symlink_to(other / "b.hdf5")
+            with self.assertRaisesRegex(ValueError, "a.hdf5: .*; .*b.hdf5: .*give gripper"):
+                softvt.Dataset(mixed)
+            self.assertEqual(len(softvt.Dataset(mixed, gripper="binary").demonstrations), 2)
+            self.assertEqual(len(softvt.Dataset(mixed, task=1).demonstrations), 1)
+
+    def test_tasks_of_several_suites_need_the_suite(self):
+        folder = FOLDER / "suites"
+        folder.mkdir()
+        for file in (self.folder / "hdf5").iterdir():
+            shutil.copy(file, folder)
+            other = folder / f"other_{file.name}"
+            shutil.copy(file, other)
+            with h5py.File(other, "r+") as opened:
+                opened["data/demo_0"].attrs["task_suite"] = "mine"
+        self.assertEqual(len(softvt.Dataset(folder).demonstrations), 4)
+        with self.assertRaisesRegex(ValueError, "task=0: the recording has demonstrations of the suites mine, object_rigid; give suite"):
+            softvt.Dataset(folder, task=0)
+        self.assertEqual([(demo.suite, demo.task) for demo in softvt.Dataset(folder, suite="mine", task=1).demonstrations], [("mine", 1)])
+        self.assertEqual(len(softvt.Dataset(folder, suite="object_rigid").demonstrations), 2)
+        with self.assertRaisesRegex(ValueError, "no demonstration of suite 'others'; the recording has those of mine, object_rigid"):
+            softvt.Dataset(folder, suite="others")
+
+    def test_demonstrations_are_those_of_the_manifest(self):
+        names = [file.name for file in sorted((self.folder / "hdf5").iterdir())]
+
+        def delete(data):
+            del data["demo_0"]
+
+        def extend(data):
+            data.copy("demo_0", "demo_1")
+
+        def attribute(key, value):
+            return lambda data: data["demo_0"].attrs.__setitem__(key, value)
+
+        for number, (change, words) in enumerate(
+            [
+                (delete, "no data/demo_0, which the manifest names"),
+                (extend, "data/demo_1 is not in the manifest"),
+                (attribute("language", "wave"), "data/demo_0: language is 'wave', and 'pick up .*' in the manifest"),
+                (attribute("task_id", 3), "data/demo_0: task_id is 3, and 0 in the manifest"),
+                (attribute("state_hash", "00"), "data/demo_0: state_hash is '00', and '[0-9a-f]+' in the manifest"),
+                (attribute("num_samples", 7), "data/demo_0: num_samples is 7, and actions has [0-9]+ steps"),
+            ]
+        ):
+            folder = FOLDER / f"changed{number}"
+            shutil.copytree(self.folder, folder)
+            with h5py.File(folder / "hdf5" / names[0], "r+") as opened:
+                change(opened["data"])
+            # Also of the file alone.
+            for path in (folder, folder / "hdf5" / names[0]):
+                with self.subTest(words), self.assertRaisesRegex(ValueError, f"{names[0]}: {words}; `softvt dataset check`"):
+                    softvt.Dataset(path)
+            self.assertEqual(len(softvt.Dataset(folder / "hdf5" / names[1]).demonstrations), 1)
+
+    def test_a_file_alone_does_not_contradict_itself(self):
+        file = FOLDER / "alone.hdf5"
+        source = next((self.folder / "hdf5").iterdir())
+
+        def shorten(data):
+            state = data["demo_0/obs/state"][:-1]
+            del data["demo_0/obs/state"]
+            data["demo_0/obs/state"] = state
+
+        for change, words in [
+            (
+                lambda data: data["demo_0"].attrs.__setitem__("num_samples", 9),
+                "data/demo_0: num_samples is 9, and actions has [0-9]+ steps",
+            ),
+            (
+                lambda data: data["demo_0"].attrs.__delitem__("num_samples"),
+                "data/demo_0 has no attribute num_samples; `softvt dataset check`",
+            ),
+            (lambda data: data.create_group("mask"), "data/mask: not a demonstration, which has a name such as demo_0"),
+            (shorten, r"data/demo_0/obs/state has the shape \([0-9]+, 7\), and the demonstration [0-9]+ steps"),
+        ]:
+            shutil.copy(source, file)
+            with h5py.File(file, "r+") as opened:
+                change(opened["data"])
+            with self.subTest(words), self.assertRaisesRegex(ValueError, f"alone.hdf5: {words}"):
+                softvt.Dataset(file)
+
+    def test_statistics_are_those_of_the_chosen_demonstrations(self):
+        data = softvt.Dataset(self.folder, keys=("state", "agentview_rgb", "privileged/pad_force"), gripper="binary", task=1)
+        found, whole = data.stats(), data.episode(0)
+        self.assertEqual(set(found), {"actions", "state", "privileged/pad_force"})
+        np.testing.assert_allclose(found["actions"]["mean"], whole["actions"].mean(0), rtol=1e-5)
+        np.testing.assert_allclose(found["state"]["q99"], np.quantile(whole["state"], 0.99, axis=0), rtol=1e-5)
+        self.assertEqual((found["actions"]["max"][6], found["state"]["std"].shape), (1.0, (7,)))
+        self.assertEqual({value.dtype.name for value in found["actions"].values()}, {"float32"})
+
     def test_a_card_that_is_no_json_is_named(self):
         folder = FOLDER / "card"
         shutil.copytree(self.folder, folder)
@@ -217,6 +320,12 @@ class Datasets(unittest.TestCase):
                 {"path": self.folder, "keys": ("privileged/states",)},
                 "data/demo_0/privileged/states is a group; give one of its streams: privileged/states/rigid_object/alphabet_soup/root_pose_w, ",
             ),
+            (
+                {"path": self.folder, "keys": ("/data/demo_1/obs/state",)},
+                "keys: '/data/demo_1/obs/state': expected the path of a stream in",
+            ),
+            ({"path": self.folder, "keys": ("obs/",)}, "keys: 'obs/': expected the path"),
+            ({"path": self.folder, "suite": 3}, "suite=3: expected text"),
             ({"path": self.folder, "safe": "yes"}, "safe='yes': expected True or False"),
             ({"path": self.folder, "task": "0"}, "task='0': expected a number or a list of numbers"),
             ({"path": self.folder, "task": []}, "no number in the list"),
