@@ -116,7 +116,7 @@ class SoftVTEnv(gymnasium.Env[Observation, np.ndarray]):
         history: control steps of each entry, the present one last, along a first axis if there are several; by default 1.
         cameras: names of the cameras of pixels, depth and segmentation, by default ("third_person", "wrist"). Only with one of them in `obs`.
         image_size: pixels of the camera images, (height, width) or one number for both; by default those of the scene. Only with such a part,
-            a profile, or render_mode="rgb_array".
+            a profile, or render_mode="rgb_array" of another camera than a finger.
         profile: a profile of softvt by name or file, in place of `obs`, `control`, `gripper`, `history` and `cameras`, which are refused beside it.
         cost: True for `info["cost"]`, which needs a server with access to the true state (`--privileged`).
         privileged: True for `info["verdict"]` and `info["state"]`.
@@ -163,7 +163,7 @@ class SoftVTEnv(gymnasium.Env[Observation, np.ndarray]):
         _refuse_given("profile", profile, own)
         _refuse_given("url", url, {**own, "profile": profile, "image_size": image_size, "flags": flags or None, "binary": binary})
         _refuse_given("script", script, {"token": token})
-        _refuse_flags(flags, {"--split": split is not None, "--gripper": gripper is not None})
+        refuse_flags(flags, {"--split": split is not None, "--gripper": gripper is not None})
         if profile is not None and obs is not None:
             raise ValueError(
                 f"obs={obs!r} and profile={profile!r}: a profile states all observations; leave out one of them. The true state is in "
@@ -174,7 +174,7 @@ class SoftVTEnv(gymnasium.Env[Observation, np.ndarray]):
         if obs is not None:
             parts = parse_parts(obs)
         if url is None and parts is not None:
-            _refuse_without_effect(parts, obs, cameras, image_size, history, render_mode)
+            _refuse_without_effect(parts, obs, cameras, image_size, history, render_mode, camera)
         control = "delta" if control is None else control
         gripper = "continuous" if gripper is None else gripper
         history = 1 if history is None else history
@@ -317,8 +317,8 @@ class SoftVTEnv(gymnasium.Env[Observation, np.ndarray]):
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Observation, dict[str, Any]]:
         """Starts episode `seed - first_seed` of the task, or a random one.
 
-        `options` may name another `task` or `split`, the `episode`, and the `seed` of the whole list of episodes. Raises ValueError for another
-        option, and for an `episode` beside the seed of another one.
+        `options` may name another `task`, by its number or a part of its prompt, or `split`, the `episode`, and the `seed` of the whole list of
+        episodes; None leaves an option out. Raises ValueError for another option, and for an `episode` beside the seed of another one.
         """
         self.begin_reset(seed, options)
         return self.end_reset()
@@ -356,13 +356,16 @@ class SoftVTEnv(gymnasium.Env[Observation, np.ndarray]):
         if options is not None and not isinstance(options, Mapping):
             raise ValueError(f"reset: options: expected a dict, got {options!r}")
         options = dict(options or {})
-        is_new = options.pop(NEW_ROLLOUT, False) or seed is not None or bool(options)
-        if self._freezes and self._last is not None and not is_new:
-            self._pending = "frozen"
-            return
+        is_rollout = bool(options.pop(NEW_ROLLOUT, False))
         unknown = options.keys() - {"task", "episode", "split", "seed"}
         if unknown:
             raise ValueError(f"reset: options has no {', '.join(map(repr, sorted(unknown)))}; expected task, episode, split or seed")
+        options = {key: value for key, value in options.items() if value is not None}
+        if self._freezes and self._last is not None and not (is_rollout or seed is not None or options):
+            self._pending = "frozen"
+            return
+        if isinstance(options.get("task"), str):
+            options["task"] = _tasks(self._suite, options["task"], self._prompts)[0]
         drawn = int(self.np_random.integers(_EPISODES))
         task = self._tasks[int(self.np_random.integers(len(self._tasks)))]
         episode = drawn if seed is None else (seed - self._first_seed) % _EPISODES
@@ -398,6 +401,18 @@ class SoftVTEnv(gymnasium.Env[Observation, np.ndarray]):
             return
         self._client.send("step", action=np.asarray(action))
         self._pending = "step"
+
+    def require_action(self, action: Any) -> None:
+        """Raises ValueError unless the server would execute an action: finite numbers (length) or (n, length)."""
+        size = self.action_space.shape[0]
+        try:
+            numbers = np.asarray(action, dtype=np.float64)
+        except (TypeError, ValueError):
+            raise ValueError(f"action: expected {size} numbers, got {action!r}") from None
+        if numbers.ndim not in (1, 2) or numbers.shape[-1] != size or numbers.size == 0:
+            raise ValueError(f"action: expected shape ({size}) or (n, {size}), got {numbers.shape}")
+        if not np.isfinite(numbers).all():
+            raise ValueError(f"action: not finite: {numbers.tolist()}")
 
     def end_step(self) -> Step:
         """Waits for `begin_step`."""
@@ -687,12 +702,14 @@ def _refuse_given(cause: str, given: object, arguments: Mapping[str, object]) ->
             raise ValueError(f"{name}={value!r} has no effect with {cause}={given!r}; leave it out")
 
 
-def _refuse_flags(flags: tuple[str, ...], given: Mapping[str, bool]) -> None:
-    """Raises ValueError for flags that an argument sets. `given` has those that may replace their argument, and whether it is given too."""
+def refuse_flags(flags: tuple[str, ...], given: Mapping[str, bool], further: Mapping[str, str] | None = None) -> None:
+    """Raises ValueError for flags that an argument sets. `given` has those that may replace their argument, and whether it is given too; `further`
+    has those that are refused besides, and what sets them."""
+    set_by = {**_SET_BY, **(further or {})}
     for flag in flags:
         name = flag.split("=")[0]
-        if name in _SET_BY and given.get(name, True):
-            raise ValueError(f"flags={flags!r}: {name} is set by {_SET_BY[name]}; leave it out of flags")
+        if name in set_by and given.get(name, True):
+            raise ValueError(f"flags={flags!r}: {name} is set by {set_by[name]}; leave it out of flags")
 
 
 def _refuse_without_effect(
@@ -702,6 +719,7 @@ def _refuse_without_effect(
     image_size: object,
     history: int | None,
     render_mode: str | None,
+    camera: str | None,
 ) -> None:
     """Raises ValueError for arguments that change nothing about these parts of an observation."""
     shown = "state" if obs is None else obs
@@ -712,6 +730,8 @@ def _refuse_without_effect(
             raise ValueError(f"cameras={cameras!r} has no effect with {found}, {pictures}")
         if image_size is not None and render_mode != "rgb_array":
             raise ValueError(f"image_size={image_size!r} has no effect with {found}, {pictures}")
+        if image_size is not None and camera in _FINGERS:
+            raise ValueError(f"image_size={image_size!r} has no effect with {found} and the finger camera={camera!r}; leave it out")
     if history not in (None, 1) and parts and all(part in PARTS_OF_ONE_STEP for part in parts):
         raise ValueError(f"history={history!r} has no effect with {found}; leave it out")
 

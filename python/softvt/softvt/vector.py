@@ -72,7 +72,8 @@ class SoftVTVectorEnv(VectorEnv):
         return self._batch(), infos
 
     def step(self, actions: Any) -> tuple[Any, np.ndarray, np.ndarray, np.ndarray, dict[str, Any]]:
-        """Executes an action in each environment. An environment whose episode has ended is reset as the autoreset mode says."""
+        """Executes an action in each environment. An environment whose episode has ended is reset as the autoreset mode says. Raises ValueError for an
+        action that is not possible, with the number of its environment; then none has stepped."""
         if self.autoreset_mode == AutoresetMode.DISABLED and self._ended.any():
             raise RuntimeError("step: an episode has ended; reset it first, by options={'reset_mask': …}")
         if len(actions) != self.num_envs:
@@ -91,6 +92,12 @@ class SoftVTVectorEnv(VectorEnv):
             return info
 
         each = [*iterate(self.action_space, actions)]
+        for index, action in enumerate(each):
+            if not restarting[index]:
+                try:
+                    self.envs[index].require_action(action)
+                except ValueError as error:
+                    raise ValueError(f"step: environment {index}: {error}") from None
         self._begin_all(
             range(self.num_envs),
             lambda index: self.envs[index].begin_reset() if restarting[index] else self.envs[index].begin_step(each[index]),

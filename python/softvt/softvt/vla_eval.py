@@ -20,7 +20,7 @@ from vla_eval.specs import (
 from vla_eval.types import Action, EpisodeResult, Observation, Task
 
 from .arguments import require_bool, require_one_of, texts, whole_number
-from .env import SoftVTEnv
+from .env import SoftVTEnv, refuse_flags
 from .profile import CONTROLS, GRIPPERS, action_size, proprio_parts
 
 # Names of the cameras in observations, as `softvt --protocol vla-eval` has them.
@@ -66,7 +66,7 @@ class SoftVTBenchmark(StepBenchmark):
         send_wrist_image: True for the wrist camera too.
         send_tactile: True for touch: the picture `tactile_image` and the markers `tactile_marker_motion` (9, 198, 2).
         image_size: edge of the camera images, pixels.
-        flags: further flags of `softvt serve`.
+        flags: further flags of `softvt serve`. Not those that arguments set.
         """
         super().__init__()
         require_one_of("control", control, CONTROLS)
@@ -75,6 +75,7 @@ class SoftVTBenchmark(StepBenchmark):
             require_bool(name, value)
         seed, image_size = whole_number("seed", seed, 0), whole_number("image_size", image_size, 1)
         flags = texts("flags", flags)
+        refuse_flags(flags, {"--split": False}, dict.fromkeys(("--seed", "--seed-file"), "the argument seed"))
         self.suite, self.seed, self.control, self.gripper = suite, seed, control, gripper
         self._sends_state = send_state
         self._cameras = tuple(_CAMERAS) if send_wrist_image else ("third_person",)

@@ -95,6 +95,12 @@ class Arguments(unittest.TestCase):
                 ({"script": "object_soft", "token": "t"}, "token='t' has no effect"),
                 ({"script": "object_soft", "profile": "libero", "obs": "pixels"}, "obs='pixels' and profile='libero': .* leave out one"),
                 ({"script": "object_soft", "image_size": 64}, "image_size=64 has no effect with obs='state'"),
+                (
+                    {"script": "object_soft", "image_size": 64, "render_mode": "rgb_array", "camera": "left"},
+                    "image_size=64 has no effect with obs='state' and the finger camera='left'; leave it out",
+                ),
+                ({"script": "object_soft", "image_size": 64, "render_mode": "sensors"}, "image_size=64 has no effect with obs='state'"),
+                ({"script": "object_soft", "flags": ("--threads", "3")}, "--threads is set by the environment for its own server"),
                 ({"script": "object_soft", "cameras": ["wrist"]}, "cameras=.* has no effect with obs='state'"),
                 ({"script": "object_soft", "obs": "tactile_image", "history": 2}, "history=2 has no effect with obs='tactile_image'"),
                 ({"script": "object_soft", "camera": "left"}, "camera='left' has no effect with render_mode=None"),

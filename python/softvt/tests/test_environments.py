@@ -218,6 +218,25 @@ class Environments(unittest.TestCase):
                 setattr(env, name, 0)
         env.reset(seed=1000)
         self.assertEqual((env.task, env.reset(options={"task": 5})[1]["task"], env.task), (3, 5, 5))
+        prompt = env.task_description
+        env.reset(seed=1000)
+        self.assertEqual((env.task, env.reset(options={"task": prompt[4:].upper()})[1]["task"]), (3, 5))
+        with self.assertRaisesRegex(ValueError, "task='zebra': 0 prompts of suite .* expected one of: "):
+            env.reset(options={"task": "zebra"})
+
+    def test_an_option_of_none_is_none(self):
+        env = self.make(obs="proprio", task=3, freeze=True)
+        _, info = env.reset(seed=1004, options={"task": None, "episode": None, "split": None, "seed": None})
+        self.assertEqual((info["task"], info["episode_index"], info["split"]), (3, 4, "validation"))
+        env.step(np.tile(HOLD, (STEPS, 1)))
+        self.assertEqual(env.reset(options={"episode": None})[1]["step"], STEPS, "the end is repeated")
+        with self.assertRaisesRegex(ValueError, "options has no 'episodes'"):
+            env.reset(options={"episodes": None})
+
+    def test_the_split_of_an_argument_is_that_of_info(self):
+        env = self.make(obs="proprio", split="demonstration")
+        self.assertEqual([env.reset(seed=1000)[1]["split"], env.step(HOLD)[4]["split"]], ["demonstration"] * 2)
+        self.assertEqual(env.reset(options={"split": "experiment"})[1]["split"], "experiment")
 
     def test_an_environment_cannot_be_pickled_or_copied(self):
         env = self.make(obs="proprio")
@@ -623,10 +642,18 @@ class Vectors(unittest.TestCase):
         envs = softvt.SoftVTVectorEnv(2, script=short_suite(), obs="proprio")
         self.addCleanup(envs.close)
         envs.reset(seed=1000)
-        with self.assertRaisesRegex(softvt.ServerError, "not finite"):
-            envs.step(np.array([HOLD * np.nan, HOLD], dtype=np.float32))
+        for action, words in [
+            (HOLD * np.nan, "not finite: .nan"),
+            (HOLD[:6], r"expected shape \(7\) or \(n, 7\), got \(6,\)"),
+            ("up", "got 'up'"),
+        ]:
+            with (
+                self.subTest(words),
+                self.assertRaisesRegex(ValueError, f"step: environment 1: action: {words}|expected 7 numbers, {words}"),
+            ):
+                envs.step([HOLD, action])
         *_, info = envs.step(np.zeros((2, 7), dtype=np.float32))
-        self.assertEqual(info["step"].tolist(), [1, 2])
+        self.assertEqual(info["step"].tolist(), [1, 1], "none has stepped before")
 
     def test_a_seed_that_contradicts_the_options_leaves_the_environments_of_a_vector_in_step(self):
         envs = softvt.SoftVTVectorEnv(2, script=short_suite(), obs="proprio")

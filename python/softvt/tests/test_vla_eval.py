@@ -128,10 +128,13 @@ class Benchmarks(unittest.TestCase):
             ({"seed": "a"}, "seed='a': expected a whole number"),
             ({"image_size": [64, 64]}, r"image_size=\[64, 64\]: expected a whole number"),
             ({"flags": "--rigid-twin"}, r'write flags=\("--rigid-twin",\)'),
+            ({"seed": 3, "flags": ["--seed", "7"]}, "--seed is set by the argument seed; leave it out of flags"),
+            ({"flags": ["--gripper=binary"]}, "--gripper is set by the argument gripper"),
             ({"send_state": "no"}, "send_state='no': expected True or False"),
         ]:
             with self.subTest(arguments), self.assertRaisesRegex(ValueError, words):
                 SoftVTBenchmark(**arguments)
+        SoftVTBenchmark(flags=["--split", "demonstration", "--shift", "stiffness=0.5"])
 
 
 if __name__ == "__main__":
