@@ -267,7 +267,7 @@ def _demonstration(file: Path, data: Any, name: str, line: Mapping[str, Any]) ->
         raise ValueError(f"{where} has no actions; {_CHECK}")
     text = {key: _text(group.attrs[key]) for key in texts_of}
     numbers = {key: int(group.attrs[key]) for key in numbers_of}
-    hashed = {key: _text(group.attrs[key]) for key in ("state_hash",) if key in group.attrs}
+    hashed = {"state_hash": _text(group.attrs.get("state_hash", ""))}
     steps = len(group["actions"])
     if numbers["num_samples"] != steps:
         raise ValueError(f"{where}: num_samples is {numbers['num_samples']}, and actions has {steps} steps; {_CHECK}")
@@ -350,7 +350,11 @@ def _manifest_lines(file: Path, known: dict[Path, list[dict[str, Any]]]) -> dict
             known[manifest] = _lines(manifest)
         names = {name for name in {line["hdf5_path"] for line in known[manifest]} if (folder / name).resolve() == file.resolve()}
         if names:
-            return {f"demo_{line['demo_id']}": line for line in known[manifest] if line["hdf5_path"] in names}
+            found: dict[str, dict[str, Any]] = {}
+            for line in known[manifest]:
+                if line["hdf5_path"] in names and found.setdefault(f"demo_{line['demo_id']}", line) is not line:
+                    raise ValueError(f"{manifest}: demo_{line['demo_id']} of {line['hdf5_path']} has two lines; {_CHECK}")
+            return found
     return None
 
 

@@ -404,7 +404,9 @@ class SoftVTEnv(gymnasium.Env[Observation, np.ndarray]):
 
     def require_action(self, action: Any) -> None:
         """Raises ValueError unless the server would execute an action: finite numbers (length) or (n, length)."""
-        size = self.action_space.shape[0]
+        shape = self.action_space.shape
+        assert shape is not None
+        size = shape[0]
         try:
             numbers = np.asarray(action, dtype=np.float64)
         except (TypeError, ValueError):

@@ -9,6 +9,7 @@ from gymnasium.vector.utils import batch_space, concatenate, create_empty_array,
 
 from .arguments import require_one_of, whole_number
 from .env import SoftVTEnv
+from .serve import ServerError
 
 
 class SoftVTVectorEnv(VectorEnv):
@@ -182,12 +183,15 @@ class SoftVTVectorEnv(VectorEnv):
                 raise
 
     def _wait(self, indices: Iterable[int], end: Callable[[int], dict[str, Any]]) -> dict[int, dict[str, Any]]:
-        """Reads the answers of all these environments. The first error is raised after that, so that no answer is left for a later request."""
+        """Reads the answers of all these environments. The first error is raised after that, so that no answer is left for a later request.
+        A refusal of the server names its environment."""
         found: dict[int, dict[str, Any]] = {}
         first: Exception | None = None
         for index in indices:
             try:
                 found[index] = end(index)
+            except ServerError as error:
+                first = first or ServerError(f"environment {index}: {error}")
             except Exception as error:
                 first = first or error
         if first is not None:

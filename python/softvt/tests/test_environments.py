@@ -654,6 +654,8 @@ class Vectors(unittest.TestCase):
                 envs.step([HOLD, action])
         *_, info = envs.step(np.zeros((2, 7), dtype=np.float32))
         self.assertEqual(info["step"].tolist(), [1, 1], "none has stepped before")
+        with self.assertRaisesRegex(softvt.ServerError, "environment 0: .*task 99"):
+            envs.reset(options={"task": 99})
 
     def test_a_seed_that_contradicts_the_options_leaves_the_environments_of_a_vector_in_step(self):
         envs = softvt.SoftVTVectorEnv(2, script=short_suite(), obs="proprio")

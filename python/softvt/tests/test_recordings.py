@@ -224,6 +224,14 @@ class Datasets(unittest.TestCase):
                     softvt.Dataset(path)
             self.assertEqual(len(softvt.Dataset(folder / "hdf5" / names[1]).demonstrations), 1)
 
+    def test_a_demonstration_has_one_line_in_the_manifest(self):
+        folder = FOLDER / "twice"
+        shutil.copytree(self.folder, folder)
+        manifest = folder / "manifest.jsonl"
+        manifest.write_text(manifest.read_text() + manifest.read_text().splitlines()[0] + "\n")
+        with self.assertRaisesRegex(ValueError, "twice/manifest.jsonl: demo_0 of hdf5/.*task0_demo.hdf5 has two lines"):
+            softvt.Dataset(folder)
+
     def test_a_file_alone_does_not_contradict_itself(self):
         file = FOLDER / "alone.hdf5"
         source = next((self.folder / "hdf5").iterdir())
