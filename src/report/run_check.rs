@@ -1,5 +1,5 @@
-//! What the records of a run must agree with in its `run.json`: suite, tasks and episodes, policy and seed, criteria and
-//! limits.
+//! What the records of a run must agree with in its `run.json`: suite, tasks and episodes, policy and seed, criteria
+//! and limits.
 //!
 //! A run whose files were changed consistently passes. Only `softvt replay`, which simulates its episodes again, proves
 //! a run.
