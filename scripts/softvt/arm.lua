@@ -166,7 +166,7 @@ function Arm:grasp(closure, options)
         closure,
         1e3 * least,
         1e3 * options.width,
-        1 - options.width / host.stroke
+        math.ceil(1e3 * (1 - options.width / host.stroke)) / 1e3
       )
     )
   end

@@ -185,8 +185,8 @@ impl Goal {
         }
     }
 
-    /// Description of the goal: "bun in cabinet.top_drawer". Goals that differ in their structure differ in text: a
-    /// sequence within another combination is in parentheses.
+    /// Description of the goal: "bun in cabinet.top_drawer". A sequence within another
+    /// combination is in parentheses, so that goals of other meaning differ in text.
     pub fn describe(&self) -> String {
         let joined = |parts: &Parts, word: &str| {
             let part = |goal: &Self| match goal {
@@ -224,7 +224,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn goals_of_other_structure_have_other_descriptions() {
+    fn goals_of_other_meaning_have_other_descriptions() {
         let named = |name: &str| Goal::Predicate { name: name.into() };
         let (a, b) = (|| named("A"), || named("B"));
         let of = |goals: Vec<Goal>| Parts { goals };

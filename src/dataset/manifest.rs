@@ -37,7 +37,7 @@ pub struct ManifestEntry {
     pub language: String,
     /// Asset of the target.
     pub asset_name: String,
-    /// Always true: only safe demonstrations that reach the goal are kept.
+    /// True if it is safe; false only where `--keep goal` kept an unsafe one.
     pub success: bool,
     /// Peak D, %; null for a rigid target.
     pub d_peak: Option<f64>,

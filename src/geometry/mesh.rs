@@ -62,6 +62,11 @@ impl Mesh {
         self.triangles.iter().map(|t| self.triangle_area(t)).sum()
     }
 
+    /// True if it encloses no volume.
+    pub(crate) fn is_flat(&self) -> bool {
+        self.volume().abs() < 1e-6 * self.area().powf(1.5)
+    }
+
     /// Area of a triangle between three vertices of the mesh, m².
     pub fn triangle_area(&self, triangle: &[u32; 3]) -> f64 {
         let [a, b, c] = triangle.map(|v| self.vertices[v as usize]);

@@ -20,7 +20,7 @@ const ROUNDING: f64 = 1e-6;
 
 /// A closed piece of a mesh.
 struct Piece {
-    /// Triangles face outwards.
+    /// Its triangles, facing outwards.
     mesh: Mesh,
     bounds: Aabb,
     /// True if the triangles faced inwards: it is the wall of a cavity.
@@ -29,7 +29,11 @@ struct Piece {
 }
 
 impl Piece {
+    /// `None` for a sheet, which has no volume to count twice.
     fn new(mut mesh: Mesh) -> Option<Self> {
+        if mesh.is_flat() {
+            return None;
+        }
         let is_cavity = mesh.volume() < 0.0;
         if is_cavity {
             mesh.triangles.iter_mut().for_each(|t| t.swap(1, 2));
@@ -53,10 +57,15 @@ impl Piece {
                 let ray = Ray::new(to_parry(&at(share)), to_parry(&(to - from)));
                 other.tree.cast_local_ray(&ray, 1.0 - share, false).map(|on| share + on)
             };
-            let Some(first) = hit_after(ROUNDING) else { return false };
-            let second = hit_after(first + ROUNDING).unwrap_or(1.0);
-            // Edges that run along a surface hit it as well.
-            [0.5 * first, 0.5 * (first + second)].iter().any(|share| other.side(&at(*share)) == Some(true))
+            // Edges that run along a surface hit it as well: the middle between two hits tells.
+            let mut last = 0.0;
+            while let Some(hit) = hit_after(last + ROUNDING) {
+                if other.side(&at(0.5 * (last + hit))) == Some(true) {
+                    return true;
+                }
+                last = hit;
+            }
+            last > 0.0 && other.side(&at(0.5 * (last + 1.0))) == Some(true)
         })
     }
 
@@ -73,8 +82,8 @@ impl Piece {
     }
 }
 
-/// Checks that no point of space is inside of two pieces of a closed mesh, or of a cavity in nothing. `mesh` faces
-/// outwards on the whole.
+/// Checks that no point of space is inside of two pieces of a closed mesh, or of a cavity in nothing. Pieces share no
+/// vertex. `mesh` faces outwards on the whole.
 ///
 /// # Errors
 /// [`MeshError::Overlap`] if one is.
@@ -91,12 +100,11 @@ pub(crate) fn check_pieces(mesh: &Mesh) -> Result<(), MeshError> {
     if of_piece.len() < 2 {
         return Ok(());
     }
-    let pieces: Option<Vec<Piece>> =
-        of_piece.into_values().map(|triangles| Piece::new(mesh.part(&triangles))).collect();
-    let pieces = pieces.ok_or(MeshError::Empty)?;
+    let pieces: Vec<Piece> =
+        of_piece.into_values().filter_map(|triangles| Piece::new(mesh.part(&triangles))).collect();
     let boxes = pieces.iter().zip(0..).map(|(piece, group)| GroupedAabb { bounds: piece.bounds, group });
     let pairs = overlapping_pairs(&boxes.collect::<Vec<_>>());
-    // How many solids are around each piece, less the cavities.
+    // Number of solids around each piece, minus that of cavities.
     let mut around = vec![0; pieces.len()];
     for (i, j) in pairs {
         let (one, other) = (&pieces[i], &pieces[j]);

@@ -1,5 +1,5 @@
-//! What the records of a run must agree with in its `run.json`: suite, tasks and episodes, policy and seed, criteria
-//! and limits.
+//! Comparison of the records of a run with its `run.json`: suite, tasks and episodes, policy and seed, criteria and
+//! limits.
 //!
 //! A run whose files were changed consistently passes. Only `softvt replay`, which simulates its episodes again, proves
 //! a run.
@@ -74,7 +74,7 @@ fn contradiction(manifest: &Value, record: &EpisodeRecord) -> Option<String> {
     None
 }
 
-/// What of the header of a record is not that of its run.
+/// The first field of the header of a record that differs from its run.
 fn other_run(manifest: &Value, record: &EpisodeRecord) -> Option<String> {
     let header = &record.header;
     let EpisodeId { suite, task, episode, base_seed, split } = &header.id;

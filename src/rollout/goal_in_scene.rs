@@ -345,12 +345,23 @@ pub fn check_goal(
     Ok(GoalAtStart { may_hold: goal.may_hold(sim), held_step: step.map(Goal::describe) })
 }
 
+/// True if a goal asks for something not to hold, which is not known of objects at rest.
+fn is_negated(node: &GoalNode) -> bool {
+    match node {
+        GoalNode::Predicate(_) => false,
+        GoalNode::None(_) => true,
+        GoalNode::All(parts) | GoalNode::Any(parts) | GoalNode::Sequence(parts) => {
+            parts.iter().any(is_negated)
+        }
+    }
+}
+
 /// The first step of a sequence that nothing comes before, if it holds at the start; `holds` says which predicates do.
 fn first_step_held<'a>(goal: &'a Goal, node: &GoalNode, holds: &[bool]) -> Option<&'a Goal> {
     match (goal, node) {
         (Goal::Sequence(goals), GoalNode::Sequence(nodes)) => {
             let (first, node) = (goals.goals.first()?, nodes.first()?);
-            match nodes.len() > 1 && GoalMonitor::new(node.clone()).update(holds) {
+            match nodes.len() > 1 && !is_negated(node) && GoalMonitor::new(node.clone()).update(holds) {
                 true => Some(first),
                 false => first_step_held(first, node, holds),
             }

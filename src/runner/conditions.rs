@@ -188,7 +188,7 @@ fn condition_cases(
     Ok(cases)
 }
 
-/// Checks that a condition sets nothing that the command line sets: it would hold in the reference alone.
+/// Checks that a condition sets nothing that the command line sets: it would not hold in that condition.
 fn check_shared_changes(config: &RunConfig, condition: &Condition) -> Result<(), RunError> {
     let refuse = |field: &'static str, change: String| {
         let message = format!("the condition {:?} sets it as well; leave it out", condition.name);

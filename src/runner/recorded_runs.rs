@@ -99,8 +99,8 @@ impl RecordedRuns {
                 requested.len()
             ));
         }
-        for index in episodes_with_actions(run).filter(|index| requested.find(*index).is_some()) {
-            run.record(index).map_or(Ok(Vec::new()), |record| actions::read_checked(&run.dir, record))?;
+        for record in run.records.iter().filter(|record| requested.find(record.header.id.index()).is_some()) {
+            actions::read_checked(&run.dir, record)?;
         }
         Ok(ReplaySource {
             run: run.dir.display().to_string(),

@@ -1,7 +1,7 @@
 //! Visuals that are valid and cannot be seen.
 
 use super::{
-    Asset, Body,
+    Asset, Body, MovingPart,
     decal::TextDecal,
     visual::{Mask, Visual},
 };
@@ -11,18 +11,22 @@ use softvt_geometry::{Aabb, Vec3};
 impl Asset {
     /// Warnings about visuals and layers that are nowhere on its surface, or that of its parts.
     pub(super) fn visual_warnings(&self) -> Vec<String> {
-        let mut warnings = self.own_visual_warnings();
-        if let Body::Articulated(parts) = &self.body {
-            for part in parts {
-                let of_part = part.asset.own_visual_warnings();
-                warnings.extend(of_part.into_iter().map(|warning| format!("part {}: {warning}", part.name)));
-            }
+        let Body::Articulated(parts) = &self.body else { return self.warnings_with_parts(&[]) };
+        // Parts without visuals of their own have those of the asset.
+        let (same, other): (Vec<&MovingPart>, Vec<&MovingPart>) =
+            parts.iter().partition(|part| part.asset.visuals == self.visuals);
+        let mut warnings = self.warnings_with_parts(&same);
+        for part in other {
+            let of_part = part.asset.warnings_with_parts(&[]);
+            warnings.extend(of_part.into_iter().map(|warning| format!("part {}: {warning}", part.name)));
         }
         warnings
     }
 
-    fn own_visual_warnings(&self) -> Vec<String> {
-        let materials = usize::from(self.shape.highest_material()) + 1;
+    /// Warnings about its visuals, which `parts` share.
+    fn warnings_with_parts(&self, parts: &[&MovingPart]) -> Vec<String> {
+        let shapes = || parts.iter().map(|part| &part.asset.shape).chain([&self.shape]);
+        let materials = shapes().map(|shape| usize::from(shape.highest_material()) + 1).max().unwrap_or(1);
         let unpainted = (materials..self.visuals.len()).map(|index| {
             format!(
                 "visuals[{}]: no part of its shape is painted with material {index}; paint it: \
@@ -30,7 +34,7 @@ impl Asset {
                 index + 1
             )
         });
-        let bounds = self.shape.loose_bounds();
+        let bounds = shapes().fold(self.shape.loose_bounds(), |all, own| all.merged(&own.loose_bounds()));
         let hidden = self.visuals.iter().enumerate().flat_map(|(index, visual)| {
             let found = hidden_layers(visual, &bounds);
             found.into_iter().map(move |warning| format!("visuals[{}].{warning}", index + 1))

@@ -18,6 +18,8 @@ _MAX_DEPTH = 6
 _MAX_LUA_BYTES = 1 << 20
 
 _REQUIRE = re.compile(r"""\brequire\s*\(?\s*["']([\w./-]+)["']""")
+# Extensions of the files that scripts read.
+_READ = (".lua", ".obj", ".stl", ".ply", ".glb", ".gltf", ".msh", ".mtl", ".png", ".jpg", ".jpeg", ".json")
 _FILE = re.compile(r"""["']([^"'\n]+\.(?:obj|stl|ply|glb|gltf|msh|mtl|png|jpe?g|json))["']""", re.IGNORECASE)
 
 
@@ -63,7 +65,7 @@ def _swept(roots: Iterable[str]) -> Iterator[str]:
         for folder, folders, files in os.walk(top):
             is_deep = folder.count(os.sep) - top.count(os.sep) >= _MAX_DEPTH
             folders[:] = [] if is_deep else sorted(below for below in folders if not below.startswith("."))
-            for file in sorted(file for file in files if not file.startswith("."))[:left]:
+            for file in sorted(file for file in files if file.lower().endswith(_READ))[:left]:
                 left -= 1
                 yield os.path.join(folder, file)
             if left == 0:
@@ -83,7 +85,7 @@ def _named_in(stamp: Stamp) -> tuple[list[str], list[str]]:
 
 
 def _stamp(path: str) -> Stamp | None:
-    """Stamp of a file; None for what is none."""
+    """Stamp of a file; None for anything else."""
     try:
         found = os.stat(path)
     except (OSError, ValueError):

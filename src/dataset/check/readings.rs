@@ -15,7 +15,7 @@ const SENSOR_ERROR: f64 = 2e-3;
 /// Largest distance of an object from the origin, m: another one is in another unit.
 const MAX_DISTANCE_M: f64 = 20.0;
 
-/// Share of the peak of D that some control step has at least.
+/// Share of the peak of D that some control step before the last has at least.
 const MIN_SHARE_OF_PEAK: f64 = 0.5;
 
 impl DemoCheck<'_> {
@@ -178,7 +178,7 @@ impl DemoCheck<'_> {
         let peak = self.file.record(self.demo).ok().and_then(|record| record.verdict.d_peak);
         if let Some(peak) = peak.filter(|_| !rms.is_empty()) {
             let own = rms.iter().copied().fold(0.0, f64::max);
-            // The peak may lie between two control steps.
+            // The stream lacks the last control step.
             if own > peak + TOLERANCE || own < MIN_SHARE_OF_PEAK * peak {
                 self.add("privileged/d", format!("its largest is {own}, and d_peak of the record {peak}"));
             }

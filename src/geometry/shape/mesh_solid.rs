@@ -79,7 +79,7 @@ impl MeshSolid {
             mesh.triangles.iter_mut().for_each(|t| t.swap(1, 2));
             mesh.uvs.iter_mut().for_each(|t| t.swap(1, 2));
         }
-        if volume.abs() < 1e-6 * mesh.area().powf(1.5) {
+        if mesh.is_flat() {
             return Err(MeshError::Flat);
         }
         check_pieces(&mesh)?;

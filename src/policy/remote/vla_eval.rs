@@ -91,7 +91,11 @@ pub(super) fn check_action_spec(server: &PolicyServer, hello: &Value) -> Result<
         Some("binary_close_positive" | "binary_close_01") => closed < open,
         _ => false,
     };
-    let is_other_range = range.is_some_and(|range| range != [open.min(closed), open.max(closed)]);
+    let is_other_range = range.is_some_and(|range| {
+        // Some servers send 32 bits.
+        let own = [open.min(closed), open.max(closed)];
+        range.iter().zip(own).any(|(stated, own)| (stated - own).abs() > 1e-6)
+    });
     if code != GripCode::Force && (is_reversed || is_other_range) {
         let gripper = format("gripper").unwrap_or_default();
         let range = range.map_or(String::new(), |[low, high]| format!(" from {low} to {high}"));

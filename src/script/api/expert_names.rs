@@ -152,8 +152,10 @@ fn check_content(scene: &Scene, content: &FieldContent) -> Result<(), String> {
         FieldContent::JointValue { joint, value } => {
             // A wrong name is told of the field of the joint.
             let Ok(range) = joint_range(scene, joint) else { return Ok(()) };
+            // As goals do.
+            const ROUNDING: f64 = 1e-4;
             let [low, high] = range.limits;
-            match (low..=high).contains(value) {
+            match (low - ROUNDING..=high + ROUNDING).contains(value) {
                 true => Ok(()),
                 false => Err(format!(
                     "expected a value of {joint} in {}..{} ({}), got {}",

@@ -277,6 +277,7 @@ impl ScriptInstance {
         if let Some(spec) = self.result::<ExperimentSpec>()? {
             let _deadline = self.vm.call_deadline();
             let points = points(lua, &spec)?.len();
+            check_grid(lua, &spec)?;
             let columns = columns(lua, &spec)?;
             let has_finish = spec.spec.finish.is_some();
             return Ok(Plan::Experiment { name: spec.spec.name, points, columns, has_finish });

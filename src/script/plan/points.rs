@@ -56,8 +56,15 @@ impl Points {
                 }
                 // A field may be absent from all points of a run.
                 let fields = names.clone();
-                let refuses =
-                    move |key: &str| key.len() > 2 && fields.iter().any(|name| is_misspelt(key, name));
+                // pos_x and pos_y, or seed and seed2, are different fields.
+                let is_sibling = |a: &str, b: &str| {
+                    let common = a.bytes().zip(b.bytes()).take_while(|(a, b)| a == b).count();
+                    common + 1 >= a.len().min(b.len())
+                };
+                let refuses = move |key: &str| {
+                    key.len() > 2
+                        && fields.iter().any(|name| is_misspelt(key, name) && !is_sibling(key, name))
+                };
                 refuse_reads(lua, &point, names.clone(), refuses)?;
                 Ok(Value::Table(point))
             }
@@ -71,6 +78,31 @@ impl Points {
                 Ok(Value::Table(point))
             }
         }
+    }
+}
+
+/// Checks that no parameter of a grid has a value twice.
+pub(crate) fn check_grid(lua: &Lua, spec: &Constructed<ExperimentSpec>) -> mlua::Result<()> {
+    for (name, values) in spec.grid.iter().flatten() {
+        let mut seen = BTreeSet::new();
+        if let Some(twice) = values.iter().find(|value| key_of(value).is_some_and(|key| !seen.insert(key))) {
+            let value = describe(twice);
+            let message = format!("experiment.grid.{name}: has {value} twice; give each value once");
+            return Err(fail_at_key(lua, &spec.table, "grid", message));
+        }
+    }
+    Ok(())
+}
+
+/// Type and bytes of a number, text or boolean.
+fn key_of(value: &Value) -> Option<(u8, Vec<u8>)> {
+    let number = |x: f64| (0, (x + 0.0).to_bits().to_le_bytes().to_vec());
+    match value {
+        Value::Integer(i) => Some(number(*i as f64)),
+        Value::Number(x) => Some(number(*x)),
+        Value::String(text) => Some((1, text.as_bytes().to_vec())),
+        Value::Boolean(flag) => Some((2, vec![u8::from(*flag)])),
+        _ => None,
     }
 }
 
@@ -99,13 +131,6 @@ pub(crate) fn points(lua: &Lua, spec: &Constructed<ExperimentSpec>) -> mlua::Res
                     lua,
                     format!("experiment.grid.{name}: expected at least one value, got none"),
                 ));
-            }
-            for (name, values) in grid {
-                if let Some(twice) = (1..values.len()).find(|at| values[..*at].contains(&values[*at])) {
-                    let value = describe(&values[twice]);
-                    let message = format!("experiment.grid.{name}: has {value} twice; give each value once");
-                    return Err(fail_at_key(lua, &spec.table, "grid", message));
-                }
             }
             let grid = Points::Grid(
                 grid.iter().rev().map(|(name, values)| (name.clone(), values.clone())).collect(),
