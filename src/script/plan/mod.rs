@@ -34,6 +34,7 @@ use crate::{
     },
 };
 use options::{OptionSession, OptionSpec, SharedOptions};
+use points::check_grid;
 pub(crate) use points::{Points, points};
 use softvt_benchmark::{
     Condition, Goal, ObjectType, Plan, Shift, ShiftValue, Suite, Task, TaskDifference,
