@@ -58,8 +58,10 @@ impl Points {
                 let fields = names.clone();
                 // pos_x and pos_y, or seed and seed2, are different fields.
                 let is_sibling = |a: &str, b: &str| {
-                    let common = a.bytes().zip(b.bytes()).take_while(|(a, b)| a == b).count();
-                    common + 1 >= a.len().min(b.len())
+                    let stem = |word: &str| word.trim_end_matches(|c: char| c.is_ascii_digit()).to_owned();
+                    let all_but_last =
+                        |word: &str| word.as_bytes().split_last().map(|(_, rest)| rest.to_vec());
+                    stem(a) == stem(b) || all_but_last(a) == all_but_last(b)
                 };
                 let refuses = move |key: &str| {
                     key.len() > 2
