@@ -516,7 +516,7 @@ class SoftVTEnv(gymnasium.Env[Observation, np.ndarray]):
             )
 
     def _warn_of_left_episode(self) -> None:
-        """Warns once of an episode of a recorded run that is left before its end, of which the server says nothing here."""
+        """Warns once if an episode of a recorded run is left before its end: it has no record then."""
         if self._is_open:
             self._is_open = False
             self._warn_once(
@@ -526,7 +526,7 @@ class SoftVTEnv(gymnasium.Env[Observation, np.ndarray]):
             )
 
     def _warn_of_other_episode(self) -> None:
-        """Warns once of an episode that a recorded run does not have, in the run's list."""
+        """Warns once if an episode is not one of the recorded run."""
         if self._run_episodes <= self._episode and self._run_episodes > 0 and self._list == self._list_of({}):
             last = self._run_episodes - 1
             self._warn_once(
