@@ -25,18 +25,37 @@ pub struct RecordContradiction {
 
 /// The first of the records, in the order of their lines, that contradicts the manifest of their run.
 pub fn first_contradiction(manifest: &Value, records: &[EpisodeRecord]) -> Option<RecordContradiction> {
-    let found = |(number, record)| {
-        Some(RecordContradiction { line: number + 1, what: contradiction(manifest, record)? })
-    };
+    let run = StatedRun::new(manifest);
+    let found =
+        |(number, record)| Some(RecordContradiction { line: number + 1, what: contradiction(&run, record)? });
     records.iter().enumerate().find_map(found)
+}
+
+/// What the manifest of a run states, `None` where it is silent.
+struct StatedRun<'a> {
+    manifest: &'a Value,
+    /// Name of the suite as its records have it.
+    suite: Option<String>,
+    criteria: Option<SuccessCriteria>,
+}
+
+impl<'a> StatedRun<'a> {
+    fn new(manifest: &'a Value) -> Self {
+        let suite = RunChanges::of_manifest(manifest)
+            .ok()
+            .and_then(|changes| Some(changes.suite_name(manifest["suite"].as_str()?)));
+        let criteria = serde_json::from_value(manifest["settings"]["criteria"].clone()).ok();
+        Self { manifest, suite, criteria }
+    }
 }
 
 /// Contradiction between a record and the manifest of its run; `None` if they agree. Skips what the manifest does not
 /// state.
-fn contradiction(manifest: &Value, record: &EpisodeRecord) -> Option<String> {
+fn contradiction(run: &StatedRun, record: &EpisodeRecord) -> Option<String> {
+    let manifest = run.manifest;
     let (v, s) = (&record.verdict, &record.stats);
     let is_valid = record.outcome.is_valid();
-    if let Some(what) = other_run(manifest, record) {
+    if let Some(what) = other_run(run, record) {
         return Some(what);
     }
     if let Some(privileged) =
@@ -53,7 +72,7 @@ fn contradiction(manifest: &Value, record: &EpisodeRecord) -> Option<String> {
         let own = v.tau.unwrap_or_default();
         return Some(format!("tau is {own}, and that of {} in the run {tau}", record.header.asset));
     }
-    let criteria: SuccessCriteria = serde_json::from_value(manifest["settings"]["criteria"].clone()).ok()?;
+    let criteria = run.criteria.as_ref()?;
     let slip_mm = 1e3 * criteria.slip_m;
     if v.no_slip != (v.slip_mm <= slip_mm) && differ(v.slip_mm, slip_mm) {
         return Some(format!(
@@ -75,12 +94,11 @@ fn contradiction(manifest: &Value, record: &EpisodeRecord) -> Option<String> {
 }
 
 /// The first field of the header of a record that differs from its run.
-fn other_run(manifest: &Value, record: &EpisodeRecord) -> Option<String> {
+fn other_run(run: &StatedRun, record: &EpisodeRecord) -> Option<String> {
+    let manifest = run.manifest;
     let header = &record.header;
     let EpisodeId { suite, task, episode, base_seed, split } = &header.id;
-    let changes = RunChanges::of_manifest(manifest).ok();
-    let of_run = changes.and_then(|changes| Some(changes.suite_name(manifest["suite"].as_str()?)));
-    if let Some(of_run) = of_run.filter(|name| name != suite) {
+    if let Some(of_run) = run.suite.as_ref().filter(|name| *name != suite) {
         return Some(format!("suite is {suite:?}, and that of the run {of_run:?}"));
     }
     let fields = [("policy", json!(header.policy)), ("seed", json!(base_seed)), ("split", json!(split))];
@@ -116,6 +134,10 @@ fn differ(a: f64, b: f64) -> bool {
 mod tests {
     use super::*;
     use crate::sample_record;
+
+    fn contradiction(manifest: &Value, record: &EpisodeRecord) -> Option<String> {
+        super::contradiction(&StatedRun::new(manifest), record)
+    }
 
     #[test]
     fn records_must_agree_with_criteria_limits_and_inputs_of_their_run() {

@@ -19,6 +19,7 @@ use softvt_evaluation::{
 };
 use softvt_geometry::{Aabb, Vec3};
 use softvt_physics::BodyId;
+use softvt_scene::Joint;
 
 /// A function of the true state that a goal asks for ([`Goal::Predicate`]).
 pub trait StatePredicate: Debug + Send + Sync {
@@ -301,12 +302,12 @@ impl Finder<'_> {
     /// The subject for a joint in the range that `range` derives from its limits. A range that includes a limit is open
     /// at it.
     fn joint(&self, name: &str, range: impl Fn([f64; 2]) -> [f64; 2]) -> Result<Subject, EpisodeError> {
-        const ROUNDING: f64 = 1e-4;
         let (part, limits) = self.part(name)?;
         let [low, high] = range(limits);
         // A joint that presses on its stop is a little beyond its limit.
-        let low = if low <= limits[0] + ROUNDING { f64::NEG_INFINITY } else { low - ROUNDING };
-        let high = if high >= limits[1] - ROUNDING { f64::INFINITY } else { high + ROUNDING };
+        let low =
+            if low <= limits[0] + Joint::TOLERANCE { f64::NEG_INFINITY } else { low - Joint::TOLERANCE };
+        let high = if high >= limits[1] - Joint::TOLERANCE { f64::INFINITY } else { high + Joint::TOLERANCE };
         Ok(Subject::Joint { part, range: [low, high] })
     }
 }

@@ -196,6 +196,9 @@ pub struct Joint {
 }
 
 impl Joint {
+    /// Differences of values that goals and checks ignore, m or rad.
+    pub const TOLERANCE: f64 = 1e-4;
+
     /// Unit of the joint's values: "m" or "rad".
     pub fn unit(&self) -> &'static str {
         match self.motion {

@@ -66,19 +66,15 @@ pub(super) fn check_action_spec(server: &PolicyServer, hello: &Value) -> Result<
             "positions as {position}, and the profile {name} reads actions of pose {own}: choose a profile with pose = {needed}"
         ));
     }
-    match format("rotation") {
+    let rotation = format("rotation").unwrap_or_default();
+    let is_other_rotation = match rotation {
+        "quaternion_xyzw" | "rot6d_interleaved" => true,
         // Of a small rotation, Euler angles are those of its axis.
-        Some(rotation @ ("quaternion_xyzw" | "rot6d_interleaved")) => {
-            return refuse(format!(
-                "rotations as {rotation}, and softvt reads axis_angle: convert them there"
-            ));
-        }
-        Some(rotation @ "euler_xyz") if is_absolute => {
-            return refuse(format!(
-                "rotations as {rotation}, and softvt reads axis_angle: convert them there"
-            ));
-        }
-        _ => {}
+        "euler_xyz" => is_absolute,
+        _ => false,
+    };
+    if is_other_rotation {
+        return refuse(format!("rotations as {rotation}, and softvt reads axis_angle: convert them there"));
     }
     let GripperValues { open, closed, code, .. } = actions.gripper;
     let range = entry(spec, "gripper").and_then(|gripper| entry(gripper, "range")).and_then(Value::as_array);

@@ -14,7 +14,7 @@ use crate::{
     },
 };
 use softvt_common::text::{format_number, unknown_name};
-use softvt_scene::{Body, JointMotion, Object, Scene};
+use softvt_scene::{Body, Joint, Object, Scene};
 
 /// Registry key of the weak table from experts to [`ExpertNames`].
 const NAMES: &str = "softvt expert names";
@@ -152,10 +152,8 @@ fn check_content(scene: &Scene, content: &FieldContent) -> Result<(), String> {
         FieldContent::JointValue { joint, value } => {
             // A wrong name is told of the field of the joint.
             let Ok(range) = joint_range(scene, joint) else { return Ok(()) };
-            // As goals do.
-            const ROUNDING: f64 = 1e-4;
             let [low, high] = range.limits;
-            match (low - ROUNDING..=high + ROUNDING).contains(value) {
+            match (low - Joint::TOLERANCE..=high + Joint::TOLERANCE).contains(value) {
                 true => Ok(()),
                 false => Err(format!(
                     "expected a value of {joint} in {}..{} ({}), got {}",
@@ -189,11 +187,7 @@ pub(crate) fn joint_range(scene: &Scene, name: &str) -> Result<JointRange, Strin
     if let Some(part) =
         object.and_then(|object| object.asset.parts().iter().find(|part| part.name == part_name))
     {
-        let unit = match part.joint.motion {
-            JointMotion::Slide => "m",
-            JointMotion::Turn => "rad",
-        };
-        return Ok(JointRange { limits: [part.joint.lower, part.joint.upper], unit });
+        return Ok(JointRange { limits: [part.joint.lower, part.joint.upper], unit: part.joint.unit() });
     }
     Err(match object {
         Some(object) if object.asset.parts().is_empty() => {
