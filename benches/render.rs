@@ -77,12 +77,12 @@ fn main() {
     let large = third.clone().with_edge(1024);
     println!("CPU milliseconds per image, one thread");
     println!("{:<28} {:>6} {:>9}   {:<5} {:>8}", "image", "goal", "measured", "met", "first");
-    report(&mut set, "third person 224, cached", 3.0, &third, true);
-    report(&mut set, "third person 224, uncached", 4.0, &third, false);
-    report(&mut set, "wrist 224", 4.0, &wrist, true);
-    report(&mut set, "third person 1024, cached", 25.0, &large, true);
-    report(&mut set, "third person 1024, uncached", 60.0, &large, false);
-    report(&mut set, "wrist 512", 20.0, &wrist.clone().with_edge(512), true);
+    report(&mut set, "third person 224, cached", 2.0, &third, true);
+    report(&mut set, "third person 224, uncached", 3.0, &third, false);
+    report(&mut set, "wrist 224", 3.0, &wrist, true);
+    report(&mut set, "third person 1024, cached", 20.0, &large, true);
+    report(&mut set, "third person 1024, uncached", 45.0, &large, false);
+    report(&mut set, "wrist 512", 12.0, &wrist.clone().with_edge(512), true);
     let Some(folder) = folder else { return };
     for task in [0, 2, 4, 6, 8] {
         let mut set = record(&loaded, task);

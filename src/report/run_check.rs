@@ -31,7 +31,7 @@ pub fn first_contradiction(manifest: &Value, records: &[EpisodeRecord]) -> Optio
     records.iter().enumerate().find_map(found)
 }
 
-/// What the manifest of a run states, `None` where it is silent.
+/// What the manifest of a run states, `None` where it states nothing.
 struct StatedRun<'a> {
     manifest: &'a Value,
     /// Name of the suite as its records have it.
