@@ -185,8 +185,8 @@ impl Goal {
         }
     }
 
-    /// Description of the goal: "bun in cabinet.top_drawer". A sequence within another combination is in parentheses, so
-    /// that goals of other meaning differ in text.
+    /// Description of the goal: "bun in cabinet.top_drawer". A sequence within another combination is in parentheses,
+    /// so that goals of other meaning differ in text.
     pub fn describe(&self) -> String {
         let joined = |parts: &Parts, word: &str| {
             let part = |goal: &Self| match goal {
