@@ -25,9 +25,13 @@ local FIELDS = {
 -- Checks the arguments of the function `name` of this file; errors are at the line that called it.
 local function check(name, arguments, types)
   softvt.check_fields(name, arguments, types)
+  if arguments.clearance < 0 then
+    error(("%s: clearance: expected metres of 0 or more, got %g"):format(name, arguments.clearance), 3)
+  end
   local function wrong(k, key, message) error(("%s: objects[%d].%s: %s"):format(name, k, key, message), 4) end
   for k, object in ipairs(arguments.objects) do
     softvt.check_fields(("%s: objects[%d]"):format(name, k), object, FIELDS)
+    if #object.at ~= 2 then wrong(k, "at", "expected a list of 2 numbers, x and y") end
     for i = 1, 2 do
       local at = object.at[i]
       if type(at) ~= "number" then wrong(k, "at", "expected a list of 2 numbers, x and y") end
@@ -39,6 +43,9 @@ local function check(name, arguments, types)
       if math.abs(object[key] or 0) > 2 * math.pi then
         wrong(k, key, ("expected radians up to a full turn, got %g; math.rad converts degrees"):format(object[key]))
       end
+    end
+    for _, key in ipairs { "position_range", "yaw_range", "clearance" } do
+      if (object[key] or 0) < 0 then wrong(k, key, ("expected a number of 0 or more, got %g"):format(object[key])) end
     end
   end
 end

@@ -147,6 +147,9 @@ impl LuaScene {
         if prompt.trim().is_empty() {
             return Err(fail(lua, "scene.prompt: expected an instruction, got an empty text"));
         }
+        if prompt.contains(char::is_control) {
+            return Err(fail(lua, format!("scene.prompt: expected one line of text, got {prompt:?}")));
+        }
         lock(task).prompt = prompt;
         Ok(())
     }

@@ -109,6 +109,23 @@ impl Drop for UseMark {
     }
 }
 
+/// Greatest height of ridges, in distances between them: the sides of higher ones are too steep for contact and meshes.
+const MAX_RIDGE_ASPECT: f64 = 3.0;
+
+/// Checks the height of ridges at a distance `pitch`, m.
+fn check_ridges(lua: &Lua, height: f64, pitch: f64) -> mlua::Result<()> {
+    if height.abs() <= MAX_RIDGE_ASPECT * pitch {
+        return Ok(());
+    }
+    let message = format!(
+        "shape:ridges: ridges of {} m at a distance of {} m are too steep; make them at most {MAX_RIDGE_ASPECT} times as high as their \
+         distance (lengths are in metres)",
+        format_number(height.abs()),
+        format_number(pitch)
+    );
+    Err(fail(lua, message))
+}
+
 impl LuaShape {
     /// The visual that its mesh files state; `None` without one.
     ///
@@ -474,6 +491,7 @@ class! {
                     return Err(fail(lua, "shape:ridges: without a count, pitch or radial_pitch it adds nothing; give one".to_owned()));
                 }
                 this.check_mask(lua, "ridges", mask.as_ref())?;
+                check_ridges(lua, height, pitch.min(radial_pitch))?;
                 let ridges = Ridges { axis, height, count, pitch, radial_pitch, phase, sharpness, mask };
                 this.derived(lua, this.copy().displaced(SurfaceRelief::Ridges(ridges)), &[])?
             }

@@ -511,6 +511,10 @@ fn task(lua: &Lua, id: usize, spec: &Constructed<TaskSpec>, budget: u32) -> mlua
             return Err(fail_at_key(lua, table, "range", message));
         }
     }
+    if spec.prompt.contains(char::is_control) {
+        let message = format!("task.prompt: expected one line of text, got {:?}", spec.prompt);
+        return Err(fail_at_key(lua, &spec.table, "prompt", message));
+    }
     if let Some(conflict) = conflict(&goal) {
         let message = format!("task.goal: can never be met: {conflict}");
         return Err(fail_at_key(lua, &spec.table, "goal", message));

@@ -254,6 +254,55 @@ fn shapes_in_wrong_units_are_refused() {
 }
 
 #[test]
+fn ridges_whose_sides_are_too_steep_are_refused() {
+    let message = |pitch: &str| {
+        error_of(&format!("softvt.shape.sphere {{ radius = 0.03 }}:ridges {{ pitch = {pitch}, height = -0.0015 }}"))
+    };
+    let steep = "suites/x.lua:1: shape:ridges: ridges of 0.0015 m at a distance of 0.0001 m are too steep";
+    assert!(message("1e-4").starts_with(steep), "{}", message("1e-4"));
+    assert!(message("1e-3").contains("a script returns a plan"), "{}", message("1e-3"));
+}
+
+#[test]
+fn an_unknown_field_of_a_standard_module_is_an_error_of_the_script() {
+    let message = error_of("local shifts = require 'shifts'\nreturn shifts.sofd");
+    assert_eq!(message, "suites/x.lua:2: shifts: unknown field \"sofd\"; did you mean \"soft\"?");
+    let module = "local grasp = require 'experts.grasp'\ngrasp.own = 1\n\
+                  for key in pairs(grasp) do if key == 'own' then error('added ' .. grasp.own) end end";
+    assert_eq!(error_of(module), "suites/x.lua:3: added 1");
+}
+
+#[test]
+fn a_prompt_of_several_lines_is_refused() {
+    let script = SUITE.replacen("prompt = ", "prompt = 'a\\n' .. ", 1);
+    assert_ne!(script, SUITE);
+    let message = error_of(&format!("{script}return suite()"));
+    assert!(message.contains("task.prompt: expected one line of text, got \"a\\n"), "{message}");
+}
+
+#[test]
+fn placements_of_the_standard_layouts_are_checked_at_the_line_of_the_script() {
+    let message = |placements: &str| {
+        let script = format!(
+            "{SUITE}local arrange = require 'layouts.arrange'\nlocal plate = require 'assets.plate'\n\
+             local s = suite()\ns.tasks[1].layout = softvt.layout('other', function(scene, rng)\n\
+             arrange.add(scene, rng, {{ {placements} }}, 0.02)\nend)\nreturn s"
+        );
+        error_of_scene(&script)
+    };
+    let line = SUITE.lines().count() + 5;
+    for (placements, expected) in [
+        ("{ name = 'a', asset = plate, at = { 0, 0, 0.2 } }", "objects[1].at: expected a list of 2 numbers, x and y"),
+        (
+            "{ name = 'a', asset = plate, at = { 0, 0 }, position_range = -0.02 }",
+            "objects[1].position_range: expected a number of 0 or more, got -0.02",
+        ),
+    ] {
+        assert_eq!(message(placements), format!("suites/x.lua:{line}: arrange.add: {expected}"));
+    }
+}
+
+#[test]
 fn an_impossible_material_is_refused() {
     let soft = |rest: &str| error_of(&format!("softvt.soft {{ density = 200, {rest} }}"));
     assert_eq!(

@@ -206,31 +206,28 @@ pub(crate) fn app_data<T: Clone + 'static>(lua: &Lua) -> mlua::Result<T> {
 
 /// Line of the innermost script function on the stack.
 pub(crate) fn current_line(lua: &Lua) -> Option<SourceLine> {
-    let mut level = 0;
-    loop {
-        let line = lua.inspect_stack(level, SourceLine::running)?;
-        if line.is_some() {
-            return line;
-        }
-        level += 1;
-    }
+    running_lines(lua).next()
 }
 
 /// Line of the innermost function on the stack that is the author's own, and not of the embedded library below
 /// `scripts/`. Without one, the outermost.
 pub(crate) fn author_line(lua: &Lua) -> Option<SourceLine> {
+    own_line(lua).or_else(|| running_lines(lua).last())
+}
+
+/// Line of the innermost function on the stack that is the author's own.
+fn own_line(lua: &Lua) -> Option<SourceLine> {
     let main = app_data::<MainFile>(lua).map(|main| main.0).unwrap_or_default();
     let is_library = |file: &str| {
         let path = file.rfind("scripts/").map(|at| &file[at..]);
         file != main && path.is_some_and(|path| embedded(path).is_some())
     };
-    let mut lines = (0..).map_while(|level| lua.inspect_stack(level, SourceLine::running)).flatten();
-    let mut outermost = None;
-    let own = lines.find(|line| {
-        outermost = Some(line.clone());
-        !is_library(&line.file)
-    });
-    own.or(outermost)
+    running_lines(lua).find(|line| !is_library(&line.file))
+}
+
+/// Lines of the script functions on the stack, from the innermost.
+fn running_lines(lua: &Lua) -> impl Iterator<Item = SourceLine> {
+    (0..).map_while(|level| lua.inspect_stack(level, SourceLine::running)).flatten()
 }
 
 /// The error, at `place` if it is one of the host without a line: a tail call leaves no line on the stack.
@@ -245,9 +242,9 @@ pub(crate) fn placed(error: mlua::Error, place: Option<SourceLine>) -> mlua::Err
     }
 }
 
-/// An error at the line of the script that is running.
+/// An error at the line that is running: the author's, if the library was called from there.
 pub(crate) fn fail(lua: &Lua, message: impl Into<String>) -> mlua::Error {
-    fail_at(lua, current_line(lua), message)
+    fail_at(lua, own_line(lua).or_else(|| current_line(lua)), message)
 }
 
 /// An error at a line, or about the main file if the line is unknown.

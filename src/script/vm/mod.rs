@@ -29,13 +29,13 @@ use error::{ErrorTranslator, MainFile, RaisedObject, ScriptError, app_data, curr
 use library::{Library, SharedLibrary, lua_text};
 use memory_budget::MemoryUse;
 use privilege::{PrivilegedAccess, check_module};
-use value::{describe, literal};
+use value::{describe, literal, sorted_pairs};
 use watchdog::{Clock, Deadline, StuckHandler};
 
 use softvt_benchmark::seed;
 use softvt_common::{
     parallel::lock,
-    text::{eprint_line, escape_control, suggest},
+    text::{eprint_line, escape_control, suggest, unknown_name},
 };
 
 /// Bytes that a virtual machine may print; later output is dropped.
@@ -379,6 +379,7 @@ fn require(lua: &Lua, loaded: &Table, name: &Value) -> mlua::Result<Value> {
     let file = lock(&library).module(&name).map_err(|error| fail(lua, error.to_string()))?;
     check_module(lua, &name, &file)?;
     let text = lua_text(&file.name, &file.bytes).map_err(mlua::Error::external)?;
+    let is_standard = library::embedded(&file.name).is_some_and(|bytes| *bytes == *file.bytes);
     let file = file.name.as_str();
     match loaded.get::<Value>(file)? {
         Value::Nil => {}
@@ -389,7 +390,7 @@ fn require(lua: &Lua, loaded: &Table, name: &Value) -> mlua::Result<Value> {
     }
     loaded.set(file, false)?;
     let chunk = lua.load(text).set_name(format!("@{file}")).set_mode(ChunkMode::Text);
-    let value = match chunk.call::<Value>(name) {
+    let value = match chunk.call::<Value>(name.as_str()) {
         Ok(Value::Nil | Value::Boolean(false)) => Value::Boolean(true),
         Ok(value) => value,
         Err(error) => {
@@ -398,8 +399,29 @@ fn require(lua: &Lua, loaded: &Table, name: &Value) -> mlua::Result<Value> {
             return Err(error);
         }
     };
+    if is_standard {
+        refuse_unknown_fields(lua, &name, &value)?;
+    }
     loaded.set(file, &value)?;
     Ok(value)
+}
+
+/// Makes it an error to read a field that the table of a module does not have.
+fn refuse_unknown_fields(lua: &Lua, module: &str, value: &Value) -> mlua::Result<()> {
+    let Some(table) = value.as_table().filter(|table| table.metatable().is_none()) else { return Ok(()) };
+    let module = module.to_owned();
+    let refuse = lua.create_function(move |lua, (table, key): (Table, Value)| {
+        let Some(key) = key.as_string().map(LuaString::to_string_lossy) else { return Ok(Value::Nil) };
+        let known: Vec<String> = sorted_pairs(&table)
+            .iter()
+            .filter_map(|(key, _)| Some(key.as_string()?.to_string_lossy()))
+            .collect();
+        let message = unknown_name("field", &key, known.iter().map(String::as_str));
+        Err(fail(lua, format!("{module}: {message}")))
+    })?;
+    let meta = lua.create_table()?;
+    meta.set("__index", refuse)?;
+    table.set_metatable(Some(meta))
 }
 
 /// The table that `pairs` and `softvt.sorted` iterate over: the value itself, or the entries of a list of the host.
