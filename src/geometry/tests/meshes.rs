@@ -3,7 +3,7 @@ use std::f64::consts::PI;
 use super::{composite_shapes, euler, exact_shapes, lathe, random_unit, rng};
 use crate::{
     Mat3, Pose, Quat, Vec3, hex8,
-    mass::mass_properties,
+    mass::{MassProperties, mass_properties},
     samples::{SampleSpec, surface_samples},
     shape::{Axis, Shape},
     surface_mesh::SurfaceMesh,
@@ -190,6 +190,84 @@ fn mass_properties_match_closed_forms_and_integration() {
     let mass = PI * 0.03 * 0.03 * 0.04 / 3.0;
     assert!((cone.mass / mass - 1.0).abs() < 2e-3 && (cone.com.z - 0.01).abs() < 2e-5, "{cone:?}");
     assert!((cone.inertia[(2, 2)] / (0.3 * mass * 0.03 * 0.03) - 1.0).abs() < 3e-3, "{cone:?}");
+}
+
+/// A box that is open at the top, and its mass properties at 1 kg/m³ as the difference of two boxes.
+fn tray(size: Vec3, wall: f64) -> (Shape, MassProperties) {
+    let space = Vec3::new(size.x - 2.0 * wall, size.y - 2.0 * wall, size.z);
+    let shape = Shape::cuboid(size).subtract(Shape::cuboid(space).translated(Vec3::z() * wall));
+    let depth = size.z - wall;
+    let (outer, removed) = (size.product(), space.x * space.y * depth);
+    let mass = outer - removed;
+    let com = Vec3::z() * (-removed * 0.5 * wall / mass);
+    let about = |mass: f64, size: Vec3, offset: f64| {
+        let s = size.component_mul(&size) / 12.0;
+        let across = offset * offset;
+        Vec3::new(s.y + s.z + across, s.z + s.x + across, s.x + s.y) * mass
+    };
+    let inertia =
+        about(outer, size, com.z) - about(removed, Vec3::new(space.x, space.y, depth), 0.5 * wall - com.z);
+    (shape, MassProperties { mass, com, inertia: Mat3::from_diagonal(&inertia) })
+}
+
+#[test]
+fn thin_walls_have_the_mass_of_closed_forms() {
+    let sizes = [([0.3, 0.3, 0.05], 2e-3), ([0.3, 0.3, 0.05], 2.5e-3), ([0.5, 0.5, 0.05], 4e-3)];
+    for (size, wall) in sizes.into_iter().chain([([0.22, 0.16, 0.03], 2e-3), ([0.2, 0.2, 0.05], 5e-4)]) {
+        let (shape, exact) = tray(Vec3::from(size), wall);
+        for (name, turn) in
+            [("along the axes", Quat::identity()), ("turned", Quat::from_euler_angles(0.4, 0.5, -0.9))]
+        {
+            // A difference of turned shapes, whose mass is not that of an upright one that is turned afterwards.
+            let pose = Pose::from_parts(Vec3::zeros().into(), turn);
+            let speck =
+                Shape::cuboid(Vec3::repeat(1e-6)).translated(turn * Vec3::new(0.0, 0.0, -0.5 * size[2]));
+            let found = mass_properties(&shape.clone().placed(pose).union(speck), 1.0);
+            let label = format!("{size:?}, walls of {wall} m, {name}");
+            assert!((found.mass / exact.mass - 1.0).abs() < 5e-3, "{label}: {} {}", found.mass, exact.mass);
+            assert!(
+                (found.com - turn * exact.com).norm() < 1e-3 * size[0],
+                "{label}: {} {}",
+                found.com,
+                turn * exact.com
+            );
+            let r = turn.to_rotation_matrix();
+            let expected = r * exact.inertia * r.transpose();
+            let error = (found.inertia - expected).abs().max() / expected.abs().max();
+            assert!(error < 1e-2, "{label}: inertia off by {error}");
+        }
+    }
+}
+
+#[test]
+fn shells_pipes_boards_and_partitions_have_the_mass_of_closed_forms() {
+    let mass = |shape: &Shape| mass_properties(shape, 1.0).mass;
+    let cube = |edge: f64| Shape::cuboid(Vec3::repeat(edge));
+    let cylinder = |radius: f64, half_height: f64| Shape::Cylinder { radius, half_height };
+    let plate = Shape::cuboid(Vec3::new(0.3, 0.2, 2e-3));
+    let block = cube(0.02).translated(Vec3::new(0.1, 0.0, 0.011));
+    let partition = Shape::cuboid(Vec3::new(2e-3, 0.29, 0.04));
+    let upper = Shape::cuboid(Vec3::repeat(0.3)).translated(Vec3::z() * 0.15);
+    let (thick_tray, of_tray) = tray(Vec3::new(0.3, 0.3, 0.05), 5e-3);
+    for (name, shape, expected) in [
+        ("closed box", cube(0.3).subtract(cube(0.296)), 0.3_f64.powi(3) - 0.296_f64.powi(3)),
+        (
+            "pipe",
+            cylinder(0.05, 0.15).subtract(cylinder(0.048, 0.2)),
+            PI * (0.05_f64.powi(2) - 0.048_f64.powi(2)) * 0.3,
+        ),
+        ("board and block", plate.union(block), 0.3 * 0.2 * 2e-3 + 0.02_f64.powi(3)),
+        (
+            "half of a hollow ball",
+            Shape::Sphere { radius: 0.12 }.subtract(Shape::Sphere { radius: 0.118 }).subtract(upper),
+            2.0 / 3.0 * PI * (0.12_f64.powi(3) - 0.118_f64.powi(3)),
+        ),
+        // Its wall is seen from no side, and its edge from the top only.
+        ("partition", thick_tray.union(partition), of_tray.mass + 2e-3 * 0.29 * 0.04),
+    ] {
+        let found = mass(&shape);
+        assert!((found / expected - 1.0).abs() < 5e-3, "{name}: {found} {expected}");
+    }
 }
 
 #[test]

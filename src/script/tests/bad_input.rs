@@ -256,7 +256,9 @@ fn shapes_in_wrong_units_are_refused() {
 #[test]
 fn ridges_whose_sides_are_too_steep_are_refused() {
     let message = |pitch: &str| {
-        error_of(&format!("softvt.shape.sphere {{ radius = 0.03 }}:ridges {{ pitch = {pitch}, height = -0.0015 }}"))
+        error_of(&format!(
+            "softvt.shape.sphere {{ radius = 0.03 }}:ridges {{ pitch = {pitch}, height = -0.0015 }}"
+        ))
     };
     let steep = "suites/x.lua:1: shape:ridges: ridges of 0.0015 m at a distance of 0.0001 m are too steep";
     assert!(message("1e-4").starts_with(steep), "{}", message("1e-4"));
@@ -292,7 +294,10 @@ fn placements_of_the_standard_layouts_are_checked_at_the_line_of_the_script() {
     };
     let line = SUITE.lines().count() + 5;
     for (placements, expected) in [
-        ("{ name = 'a', asset = plate, at = { 0, 0, 0.2 } }", "objects[1].at: expected a list of 2 numbers, x and y"),
+        (
+            "{ name = 'a', asset = plate, at = { 0, 0, 0.2 } }",
+            "objects[1].at: expected a list of 2 numbers, x and y",
+        ),
         (
             "{ name = 'a', asset = plate, at = { 0, 0 }, position_range = -0.02 }",
             "objects[1].position_range: expected a number of 0 or more, got -0.02",

@@ -1,5 +1,7 @@
 //! Mass, centre of mass and inertia of uniform solids.
 
+mod thin_walls;
+
 use serde::{Deserialize, Serialize};
 
 use super::{
@@ -28,7 +30,8 @@ const COARSE_CELLS: f64 = 24.0;
 /// Mass properties of `shape` with uniform `density`, kg/m³.
 ///
 /// Exact for boxes, spheres, ellipsoids, capsules, cylinders, tori, prisms, lathes, imported meshes and their
-/// placements; otherwise integrated over a fine closed surface mesh.
+/// placements; otherwise integrated over a fine closed surface mesh, or over an octree where walls are thinner than the
+/// cells of that mesh.
 pub fn mass_properties(shape: &Shape, density: f64) -> MassProperties {
     unit_density(shape, CELLS).scaled(density)
 }
@@ -41,6 +44,14 @@ pub fn approximate_mass_properties(shape: &Shape, density: f64) -> MassPropertie
 impl MassProperties {
     fn scaled(self, density: f64) -> Self {
         Self { mass: self.mass * density, com: self.com, inertia: self.inertia * density }
+    }
+
+    /// From volume, first and second moments about `base`, at 1 kg/m³.
+    fn of_moments(volume: f64, first: Vec3, second: Mat3, base: Vec3) -> Self {
+        let com = if volume > 0.0 { first / volume } else { Vec3::zeros() };
+        let central = second - com * com.transpose() * volume;
+        let inertia = Mat3::identity() * central.trace() - central;
+        Self { mass: volume, com: base + com, inertia }
     }
 
     fn centred(mass: f64, diagonal: Vec3) -> Self {
@@ -98,7 +109,13 @@ fn unit_density(shape: &Shape, cells: f64) -> MassProperties {
             unit_density(shape, cells).resized(scale.x)
         }
         Shape::Mesh(solid) => of_mesh(solid.mesh()),
-        _ => of_mesh(&surface_triangles(shape, shape.loose_bounds().size().max() / cells).0),
+        _ => {
+            let cell = shape.loose_bounds().size().max() / cells;
+            match thin_walls::wall_below(shape, cell) {
+                Some(wall) => thin_walls::integrate(shape, wall),
+                None => of_mesh(&surface_triangles(shape, cell).0),
+            }
+        }
     }
 }
 
@@ -166,8 +183,5 @@ fn of_mesh(mesh: &Mesh) -> MassProperties {
         let squares = a * a.transpose() + b * b.transpose() + c * c.transpose();
         second += (sum * sum.transpose() + squares) * (six / 120.0);
     }
-    let com = if volume > 0.0 { first / volume } else { Vec3::zeros() };
-    let central = second - com * com.transpose() * volume;
-    let inertia = Mat3::identity() * central.trace() - central;
-    MassProperties { mass: volume, com: base + com, inertia }
+    MassProperties::of_moments(volume, first, second, base)
 }
