@@ -21,6 +21,7 @@ pub mod shape;
 pub mod surface_mesh;
 pub mod union_find;
 pub mod voxel;
+pub mod walls;
 
 pub use aabb::{Aabb, GroupedAabb, overlapping_pairs};
 pub use linear_algebra::{Mat3, Pose, Quat, Vec3, basis_from_reference, orthonormal_basis};

@@ -18,7 +18,7 @@ use softvt_benchmark::Plan;
 use softvt_common::cancel;
 use softvt_common::{
     files::replace,
-    text::{TextTable, counted, unknown_name},
+    text::{TextTable, counted, is_misspelt, significant, unknown_name},
 };
 use softvt_report::run_folder::RunFolder;
 use softvt_script::{
@@ -52,6 +52,9 @@ pub enum ExperimentOutput<'a> {
     Text(&'a str),
 }
 
+/// Smallest number in a table that is shown with five decimals; smaller ones have three significant digits.
+const MIN_DECIMAL: f64 = 1e-3;
+
 /// Rows as text, in these columns or in those of all rows; empty without rows.
 pub fn table(rows: &[ExperimentRow], columns: &[String]) -> String {
     if rows.is_empty() {
@@ -70,8 +73,9 @@ fn cell(value: Option<&Value>) -> String {
     match value {
         None | Some(Value::Null) => "-".to_owned(),
         Some(Value::String(text)) => text.clone(),
-        Some(Value::Number(number)) => number.as_f64().map_or(number.to_string(), |x| {
-            format!("{x:.5}").trim_end_matches('0').trim_end_matches('.').to_owned()
+        Some(Value::Number(number)) => number.as_f64().map_or(number.to_string(), |x| match x.abs() {
+            0.0 | MIN_DECIMAL.. => format!("{x:.5}").trim_end_matches('0').trim_end_matches('.').to_owned(),
+            _ => significant(x, 3),
         }),
         Some(other) => other.to_string(),
     }
@@ -200,10 +204,17 @@ fn problem_of(rows: &[ExperimentRow], columns: &[String]) -> Option<String> {
         );
     }
     let known: BTreeSet<&str> = rows.iter().flat_map(|row| row.keys().map(String::as_str)).collect();
+    let is_unknown = |column: &&String| !known.contains(column.as_str());
+    if let Some(first) = columns.first().filter(|_| columns.iter().all(|column| is_unknown(&column))) {
+        let unknown = unknown_name("column", first, known.iter().copied());
+        return Some(format!("experiment.columns: no row has any of them: {unknown}"));
+    }
     // Rows of some options lack some columns.
-    let first = columns.first().filter(|_| columns.iter().all(|column| !known.contains(column.as_str())))?;
-    let unknown = unknown_name("column", first, known.iter().copied());
-    Some(format!("experiment.columns: no row has any of them: {unknown}"))
+    let left_out = |name: &&&str| !columns.iter().any(|column| column == **name);
+    columns.iter().filter(is_unknown).find_map(|column| {
+        let meant = known.iter().filter(left_out).find(|name| is_misspelt(column, name))?;
+        Some(format!("experiment.columns: no row has {column:?}; did you mean {meant:?}?"))
+    })
 }
 
 fn manifest<'a>(
@@ -276,4 +287,39 @@ fn write(config: &RunConfig, base: &Path, relative: &str, bytes: &[u8]) -> Resul
     replace(&path, bytes)?;
     config.notice(format!("wrote {}", path.display()));
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use serde_json::json;
+
+    fn row(value: Value) -> ExperimentRow {
+        serde_json::from_value(value).unwrap()
+    }
+
+    #[test]
+    fn small_numbers_keep_three_digits() {
+        for (number, text) in [
+            (3e-6, "0.000003"),
+            (1.7e-9, "1.7e-9"),
+            (-1.23456e-4, "-0.000123"),
+            (0.0, "0"),
+            (12.25, "12.25"),
+            (0.001234567, "0.00123"),
+        ] {
+            assert_eq!(cell(Some(&json!(number))), text, "{number}");
+        }
+    }
+
+    #[test]
+    fn a_misspelt_column_is_named_and_one_of_another_option_is_not() {
+        let rows = [row(json!({ "width_mm": 1, "force_n": 2 }))];
+        let problem = |columns: &[&str]| {
+            problem_of(&rows, &columns.iter().map(ToString::to_string).collect::<Vec<_>>())
+        };
+        let expected = "experiment.columns: no row has \"widht_mm\"; did you mean \"width_mm\"?";
+        assert_eq!(problem(&["force_n", "widht_mm"]).as_deref(), Some(expected));
+        assert_eq!(problem(&["width_mm", "strain"]), None);
+    }
 }

@@ -1,6 +1,6 @@
 //! Mass, centre of mass and inertia of uniform solids.
 
-mod thin_walls;
+mod octree;
 
 use serde::{Deserialize, Serialize};
 
@@ -9,6 +9,7 @@ use super::{
     mesh::Mesh,
     shape::{Polygon, Shape},
     surface_mesh::surface_triangles,
+    walls::wall_below,
 };
 
 /// Mass, centre of mass and inertia of a uniform solid.
@@ -111,8 +112,8 @@ fn unit_density(shape: &Shape, cells: f64) -> MassProperties {
         Shape::Mesh(solid) => of_mesh(solid.mesh()),
         _ => {
             let cell = shape.loose_bounds().size().max() / cells;
-            match thin_walls::wall_below(shape, cell) {
-                Some(wall) => thin_walls::integrate(shape, wall),
+            match wall_below(shape, cell) {
+                Some(wall) => octree::integrate(shape, wall),
                 None => of_mesh(&surface_triangles(shape, cell).0),
             }
         }

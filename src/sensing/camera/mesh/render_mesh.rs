@@ -22,6 +22,7 @@ use softvt_geometry::{
     shape::Shape,
     surface_mesh::SurfaceMesh,
     voxel::{Embedding, VoxelMesh},
+    walls::wall_below,
 };
 use softvt_scene::{Visual, VisualLayer};
 
@@ -150,14 +151,13 @@ impl RenderMesh {
 
     /// Builds the level that casts shadows, which every image needs, and leaves finer ones for later.
     fn with_lazy_levels(surface: ShapeSurface) -> Result<Self, CameraError> {
-        // A mesh has its own triangles at every level.
-        let cells = if matches!(surface.material.shape, Shape::Mesh(_)) { &CELLS[..1] } else { &CELLS };
+        let cells = surface.cells()?;
         let surface = Arc::new(surface);
-        let level = |(index, &cells): (usize, &f64)| {
+        let level = |(index, cells): (usize, f64)| {
             let surface = surface.clone();
             lazy_level(move || surface.level(cells, index == 0))
         };
-        let mesh = Self { levels: cells.iter().enumerate().map(level).collect() };
+        let mesh = Self { levels: cells.into_iter().enumerate().map(level).collect() };
         mesh.caster()?;
         Ok(mesh)
     }
@@ -331,12 +331,32 @@ impl ShapeSurface {
         self.embed(lod)
     }
 
+    /// Cells along the longest edge of the shape, per level of detail. A shape with walls that the finest level would
+    /// miss has one level with cells that are as small.
+    fn cells(&self) -> Result<Vec<f64>, CameraError> {
+        let shape = &self.material.shape;
+        // A mesh has its own triangles at every level.
+        if matches!(shape, Shape::Mesh(_)) {
+            return Ok(vec![CELLS[0]]);
+        }
+        let size = shape.bounds().size().max();
+        let wall = self.cache.get("wall", &self.key, || {
+            let is_meshed = self.primitives(size / CELLS[0]).is_none();
+            Ok(is_meshed.then(|| wall_below(shape, size / CELLS[0])).flatten())
+        })?;
+        Ok(wall.map_or(CELLS.to_vec(), |wall| vec![size / wall]))
+    }
+
     fn triangulate(&self, cell: f64) -> Mesh {
+        self.primitives(cell).unwrap_or_else(|| SurfaceMesh::from_shape(&self.material.shape, cell).mesh)
+    }
+
+    /// The mesh of a shape that is made of primitives, where it is better than that of the surface mesher.
+    fn primitives(&self, cell: f64) -> Option<Mesh> {
         let shape = &self.material.shape;
         // Textured faces of rigid shapes need no small triangles.
         let prefers_primitives = is_revolved(shape) || self.voxels.is_none() && self.is_textured;
-        let primitives = prefers_primitives.then(|| primitive_mesh(shape, cell)).flatten();
-        primitives.unwrap_or_else(|| SurfaceMesh::from_shape(shape, cell).mesh)
+        prefers_primitives.then(|| primitive_mesh(shape, cell)).flatten()
     }
 
     /// Height of the highest relief, m.
