@@ -73,7 +73,7 @@ fn report(case: &Case, gel: &Gel, optics: &PolynomialOptics) {
     let image = min_ms(|| drop(black_box(optics.render(gel, Some(&field), false))));
     let with_shadows = min_ms(|| drop(black_box(optics.render(gel, Some(&field), true))));
     let markers = min_ms(|| {
-        black_box(Markers::new(gel, &MarkerModel::Elastic, Some(&field)));
+        black_box(Markers::new(gel, &MarkerModel::Elastic {}, Some(&field)));
     });
     println!("{:<28} {solve:>9.3} {image:>9.3} {with_shadows:>12.3} {markers:>11.4}", case.name);
 }

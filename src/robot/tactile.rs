@@ -105,12 +105,13 @@ impl Pinhole {
 }
 
 /// Model of the colour image.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+///
+/// Models without parameters have braces, since serde ignores unknown fields of unit variants.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "model", rename_all = "snake_case", deny_unknown_fields)]
 pub enum OpticsModel {
     /// Polynomial of the surface's slope, fitted to a real GelSight Mini.
-    #[default]
-    Polynomial,
+    Polynomial {},
     /// Pipeline of Taxim (Si & Yuan, RA-L 2022) with calibration tables of the user.
     Taxim {
         /// Folder with `polycalib.npz` and `dataPack.npz`.
@@ -119,12 +120,11 @@ pub enum OpticsModel {
 }
 
 /// Model of the marker motion.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "model", rename_all = "snake_case", deny_unknown_fields)]
 pub enum MarkerModel {
     /// Markers move with the surface of the gel and are seen through the pinhole.
-    #[default]
-    Elastic,
+    Elastic {},
     /// Markers move by the law of FOTS (Zhao et al., arXiv 2404.19217).
     Fots(FotsSpec),
 }
@@ -153,12 +153,24 @@ impl TactileSpec {
     /// Names the first parameter out of its range, its value and the range.
     pub fn validate(&self) -> Result<(), RangeError> {
         self.check("tactile")?;
-        if self.shadows && self.optics != OpticsModel::Polynomial {
+        if self.shadows && self.optics != OpticsModel::default() {
             let expected = "false with the model \"taxim\", whose images have no shadows";
             let (path, value) = ("tactile.shadows".into(), "true".into());
             return Err(RangeError { path, expected: expected.into(), value });
         }
         Ok(())
+    }
+}
+
+impl Default for OpticsModel {
+    fn default() -> Self {
+        Self::Polynomial {}
+    }
+}
+
+impl Default for MarkerModel {
+    fn default() -> Self {
+        Self::Elastic {}
     }
 }
 
@@ -182,7 +194,7 @@ impl SettingField for MarkerModel {
 
     fn check_declared(&self, declaration: &SettingDeclaration<'_>) -> Result<(), RangeError> {
         match self {
-            Self::Elastic => Ok(()),
+            Self::Elastic {} => Ok(()),
             Self::Fots(fots) => fots.check_declared(declaration),
         }
     }
@@ -214,6 +226,13 @@ mod tests {
         assert_eq!(spec.markers, MarkerModel::Fots(FotsSpec { scale: 15.77, ..FotsSpec::default() }));
         let unknown = serde_json::from_str::<TactileSpec>(r#"{ "optics": { "model": "photon" } }"#);
         assert!(unknown.expect_err("unknown model").to_string().contains("photon"));
+        for idle in [
+            r#"{ "markers": { "model": "elastic", "dilate": 1 } }"#,
+            r#"{ "optics": { "model": "polynomial", "x": 1 } }"#,
+        ] {
+            let message = serde_json::from_str::<TactileSpec>(idle).expect_err(idle).to_string();
+            assert!(message.contains("unknown field"), "{message}");
+        }
     }
 
     #[test]

@@ -2,11 +2,13 @@
 //! file.
 
 use std::{
+    fs::File,
+    io::{BufRead, BufReader},
     path::{Path, PathBuf},
     str::FromStr,
 };
 
-use crate::error::RunError;
+use crate::{config::TraceDetail, error::RunError};
 use softvt_common::cancel;
 use softvt_common::episode_id::EpisodeIndex;
 use softvt_common::files;
@@ -66,7 +68,7 @@ impl FromStr for EpisodeFilter {
 /// Paths of the files in a run folder, and which of them are requested.
 pub(crate) struct EpisodeArtifacts<'a> {
     pub dir: &'a Path,
-    pub trace: bool,
+    pub trace: Option<TraceDetail>,
     pub video: Option<&'a EpisodeFilter>,
     pub mcap: Option<&'a EpisodeFilter>,
 }
@@ -92,7 +94,7 @@ impl EpisodeArtifacts<'_> {
         let index = record.header.id.index();
         let mut requested =
             vec![actions::path(self.dir, index), softvtbench_files::debug_log_path(self.dir, index)];
-        if self.trace {
+        if self.trace.is_some() {
             requested.push(self.trace_path(index));
         }
         if self.has_mcap(record) {
@@ -104,10 +106,12 @@ impl EpisodeArtifacts<'_> {
                 requested.push(video::still_path(self.dir, index));
             }
         }
-        let actions_path = actions::path(self.dir, index);
-        let is_intact = |path: &PathBuf| match *path == actions_path {
-            true => self.has_actions(record),
-            false => path.is_file(),
+        let (actions_path, trace_path) = (actions::path(self.dir, index), self.trace_path(index));
+        let needs_nodes = self.trace == Some(TraceDetail::Nodes) && record.header.soft;
+        let is_intact = |path: &PathBuf| match path {
+            path if *path == actions_path => self.has_actions(record),
+            path if *path == trace_path && needs_nodes => has_nodes(path),
+            path => path.is_file(),
         };
         requested.retain(|path| !is_intact(path));
         requested
@@ -125,7 +129,7 @@ impl EpisodeArtifacts<'_> {
     pub(crate) fn write(&self, finished: &FinishedEpisode) -> Result<(), RunError> {
         let header = &finished.record.header;
         let index = header.id.index();
-        if self.trace {
+        if self.trace.is_some() {
             files::write_json_lines(&self.trace_path(index), &finished.trace)?;
         }
         let path = softvtbench_files::debug_log_path(self.dir, index);
@@ -165,6 +169,13 @@ impl EpisodeArtifacts<'_> {
         let EpisodeIndex { task, episode } = index;
         self.dir.join(format!("trace/task_{task:03}/episode_{episode:05}.jsonl"))
     }
+}
+
+/// True if a trace has the positions of nodes.
+fn has_nodes(path: &Path) -> bool {
+    let mut line = String::new();
+    let is_read = File::open(path).and_then(|file| BufReader::new(file).read_line(&mut line)).is_ok();
+    is_read && line.contains("\"nodes\":")
 }
 
 /// The log of every control step that the scorer of SoftVTBench reads.

@@ -302,12 +302,7 @@ impl<'a> SuiteRun<'a> {
     /// Files of the episodes, other than their lines in `episodes.jsonl`.
     pub(crate) fn artifacts(&self) -> EpisodeArtifacts<'_> {
         let RunConfig { trace, video, mcap, .. } = self.config;
-        EpisodeArtifacts {
-            dir: &self.out,
-            trace: trace.is_some(),
-            video: video.as_ref(),
-            mcap: mcap.as_ref(),
-        }
+        EpisodeArtifacts { dir: &self.out, trace: *trace, video: video.as_ref(), mcap: mcap.as_ref() }
     }
 
     /// Runs one episode, from the start of its foreign demonstration if it has one. With `keep_states` the

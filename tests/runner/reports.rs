@@ -221,6 +221,12 @@ fn lost_files_are_restored_byte_identically() {
         |e: u32, kind: &str| project.path(&format!("run/video/task_000/episode_0000{e}.{kind}")).exists();
     assert!(drawn(1, "mp4") && drawn(1, "png") && !drawn(0, "mp4"));
     assert!(files.map(bytes) == before);
+    // So can the positions of nodes. A trace that has them stays.
+    told(project.run("x.lua").episodes(3).trace(TraceDetail::Nodes).out("run"));
+    let with_nodes =
+        |e: u32| project.text(&format!("run/trace/task_000/episode_0000{e}.jsonl")).contains("\"nodes\":");
+    assert!((0..3).all(with_nodes));
+    assert!(told(run()).contains("already complete") && (0..3).all(with_nodes));
     // A simulation that differs from its record is reported, and its files are not restored.
     let lines = project.text("run/episodes.jsonl").replacen("\"state_hash\":\"", "\"state_hash\":\"f", 1);
     project.write("run/episodes.jsonl", lines.as_bytes());

@@ -1,6 +1,8 @@
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use super::*;
+use crate::{EpisodeSetup, SceneChanges};
+use softvt_common::episode_id::{EpisodeId, EpisodeSplit};
 
 #[test]
 fn a_missing_file_is_named() {
@@ -290,7 +292,18 @@ fn placements_of_the_standard_layouts_are_checked_at_the_line_of_the_script() {
              local s = suite()\ns.tasks[1].layout = softvt.layout('other', function(scene, rng)\n\
              arrange.add(scene, rng, {{ {placements} }}, 0.02)\nend)\nreturn s"
         );
-        error_of_scene(&script)
+        let project = Project::new(&[("suites/x.lua", &script)]);
+        let loaded = project.load("suites/x.lua", &[]).expect("it loads");
+        let folder = format!("{}/", project.path("").display()).replace("//", "/");
+        let id = EpisodeId {
+            suite: "test".into(),
+            task: 0,
+            episode: 0,
+            base_seed: 1,
+            split: EpisodeSplit::Validation,
+        };
+        let error = EpisodeSetup::open(&loaded, &id, &SceneChanges::default()).err().expect("an error");
+        error.to_string().replace(&folder, "")
     };
     let line = SUITE.lines().count() + 5;
     for (placements, expected) in [

@@ -108,7 +108,7 @@ impl TactileSensor {
     pub fn new(spec: &TactileSpec) -> Result<Self, TactileSensorError> {
         let gel = Gel::new(spec, PadSurface::default())?;
         let optics = match &spec.optics {
-            OpticsModel::Polynomial => OpticsBackend::Polynomial {
+            OpticsModel::Polynomial {} => OpticsBackend::Polynomial {
                 optics: Box::new(PolynomialOptics::gelsight_mini()?),
                 shadows: spec.shadows,
             },

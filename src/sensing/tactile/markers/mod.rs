@@ -42,7 +42,7 @@ impl Markers {
         let rest = Self::at_rest();
         let Some(field) = field else { return rest };
         let current = match model {
-            MarkerModel::Elastic => rest.initial.map(|px| elastic(gel, field, px)),
+            MarkerModel::Elastic {} => rest.initial.map(|px| elastic(gel, field, px)),
             MarkerModel::Fots(law) => fots(gel, law, field, &rest.initial),
         };
         Self { current, ..rest }

@@ -20,7 +20,7 @@ fn gel() -> Gel {
 #[test]
 fn without_a_contact_no_marker_moves() {
     let gel = gel();
-    for model in [MarkerModel::Elastic, MarkerModel::Fots(FotsSpec::default())] {
+    for model in [MarkerModel::Elastic {}, MarkerModel::Fots(FotsSpec::default())] {
         assert_eq!(Markers::new(&gel, &model, None), Markers::at_rest());
     }
 }
@@ -30,7 +30,7 @@ fn a_dent_moves_markers_outwards_by_perspective_and_by_the_gel() {
     let gel = gel();
     let skin = graph(12e-3, 2e-4, |_, _| 0.0);
     let field = pressed(&gel, &skin, PadWrench::new(40.0, [0.0; 2], 0.0, [0.0; 2]));
-    let Markers { initial: from, current: to } = Markers::new(&gel, &MarkerModel::Elastic, Some(&field));
+    let Markers { initial: from, current: to } = Markers::new(&gel, &MarkerModel::Elastic {}, Some(&field));
     let marker = 4 * 11 + 8;
     let rest = gel.view.image_to_pad(&gel.pad, from[marker].map(f64::from));
     let u = field.displacement_at(&gel, rest.x, rest.y);
@@ -49,13 +49,13 @@ fn shear_moves_markers_along_and_gravity_pulls_them_to_the_left_on_both_fingers(
     let still = pressed(&gel, &flat, PadWrench::new(5.0, [0.0; 2], 0.0, [0.0; 2]));
     for (shear, axis, sign) in [([-2.0, 0.0], 0, -1.0), ([0.0, 2.0], 1, 1.0)] {
         let field = pressed(&gel, &flat, PadWrench::new(5.0, shear, 0.0, [0.0; 2]));
-        for model in [MarkerModel::Elastic, MarkerModel::Fots(FotsSpec::default())] {
+        for model in [MarkerModel::Elastic {}, MarkerModel::Fots(FotsSpec::default())] {
             let place = |field| Markers::new(&gel, &model, Some(field)).current[4 * 11 + 5];
             let (before, after) = (place(&still), place(&field));
             let moved = f64::from(after[axis] - before[axis]) * sign;
             let across = f64::from(after[1 - axis] - before[1 - axis]);
             assert!(moved > 0.3 && across.abs() < 0.05 * moved, "{model:?}: {moved} px, across {across}");
-            if model == MarkerModel::Elastic {
+            if matches!(model, MarkerModel::Elastic {}) {
                 // The middle of a stuck patch moves with it.
                 let expected = [field.stick_motion.x, field.stick_motion.y][axis] * sign / gel.view.pitch;
                 assert!((moved / expected - 1.0).abs() < 0.1, "{moved} px, patch {expected} px");
@@ -68,7 +68,7 @@ fn shear_moves_markers_along_and_gravity_pulls_them_to_the_left_on_both_fingers(
 fn twist_moves_opposite_markers_in_opposite_directions() {
     let gel = gel();
     let flat = graph(6e-3, 2e-4, |_, _| 0.0);
-    for model in [MarkerModel::Elastic, MarkerModel::Fots(FotsSpec::default())] {
+    for model in [MarkerModel::Elastic {}, MarkerModel::Fots(FotsSpec::default())] {
         let place = |twist| {
             let field = pressed(&gel, &flat, PadWrench::new(5.0, [0.0; 2], twist, [0.0; 2]));
             Markers::new(&gel, &model, Some(&field)).current
