@@ -34,7 +34,14 @@ local opt = softvt.options {
     help = "press test of the object alone, or the paper's sweep with the robot's hand",
   },
   kappa = { default = 0.5, min = 0.05, max = 1, needs_out = true, help = "τ as a fraction of D_ref" },
-  step_mm = { default = 0.5, unit = "mm", min = 0.02, max = 5, only_with = PRESS, help = "step of the width" },
+  step_mm = {
+    default = 0.5,
+    unit = "mm",
+    min = 0.02,
+    max = 5,
+    only_with = PRESS,
+    help = "step of the width; 5 mm change τ by a few per cent",
+  },
   within_mm = {
     default = 0.02,
     unit = "mm",

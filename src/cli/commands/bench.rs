@@ -39,6 +39,12 @@ pub(super) fn run(args: &BenchArgs) -> Result<(), CliError> {
     let published: MachineRates = serde_json::from_slice(published)?;
     let on_stage = |stage: &str| eprint_notice(format!("measuring: {stage}"));
     if let Some(path) = &args.growth {
+        if path.extension().is_none_or(|extension| extension != "svg") {
+            return Err(CliError::input(format!(
+                "--growth {}: give a file that ends in .svg",
+                path.display()
+            )));
+        }
         let curves = growth::measure(&published.script, thread_count(args.threads), on_stage)?;
         replace(path, growth::plot(&curves))?;
         return print(&growth::table(&curves));

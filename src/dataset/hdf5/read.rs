@@ -183,12 +183,14 @@ impl TaskFile {
         self.data.attr_string(name).ok()
     }
 
-    /// True if the attribute of `/data` of this name is the integer `expected`. rust-hdf5 returns the number of a group
-    /// as text: its bytes up to the first that is 0.
+    /// True if the attribute of `/data` of this name is the integer `expected`.
     pub(crate) fn has_count(&self, name: &str, expected: usize) -> bool {
-        let bytes = (expected as u64).to_le_bytes();
-        let end = bytes.iter().position(|byte| *byte == 0).unwrap_or(bytes.len());
-        self.file_attribute(name).is_some_and(|text| text == String::from_utf8_lossy(&bytes[..end]))
+        self.file_attribute(name).is_some_and(|text| is_number(&text, expected as u64))
+    }
+
+    /// True if an attribute of a demonstration is another integer than `expected`, or is one of another type.
+    pub(crate) fn contradicts(&self, demo: usize, attribute: &str, expected: u64) -> bool {
+        self.text(demo, attribute).is_ok_and(|text| !is_number(&text, expected))
     }
 
     /// True if a demonstration has a dataset of this name, readable or not.
@@ -300,6 +302,10 @@ impl TaskFile {
 
     /// Reads all numbers of an array as `f64`.
     fn read_f64(&self, demo: usize, name: &str, data: &H5Dataset) -> Result<Vec<f64>, DatasetError> {
+        if let Ok(DatatypeMessage::FixedPoint { size: 8, .. }) = data.datatype() {
+            let what = "expected numbers of type float32 or float64, got integers of 64 bits";
+            return Err(self.error(demo, name, what));
+        }
         match limits::size_refusal(&data.shape(), size_of::<f64>()) {
             Some(what) => Err(self.error(demo, name, what)),
             None => data.read_numeric_as().map_err(self.failed(demo, name)),
@@ -456,4 +462,11 @@ fn superblock_end(head: &[u8]) -> Option<u64> {
         return Some(0);
     }
     Some(u64::from_le_bytes(head.get(at..at + 8)?.try_into().ok()?))
+}
+
+/// True if the text that rust-hdf5 returns for the integer of a group is `expected`: its bytes up to the first zero.
+fn is_number(text: &str, expected: u64) -> bool {
+    let bytes = expected.to_le_bytes();
+    let end = bytes.iter().position(|byte| *byte == 0).unwrap_or(bytes.len());
+    text == String::from_utf8_lossy(&bytes[..end])
 }

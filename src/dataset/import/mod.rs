@@ -18,10 +18,12 @@ use sha2::{Digest, Sha256};
 
 use self::demo_reader::DemoReader;
 use super::{DatasetError, TaskFile};
+use softvt_benchmark::CONTROL_DT;
 use softvt_common::episode_id::EpisodeSplit;
 use softvt_common::files::FileError;
 use softvt_common::text::hex;
 use softvt_policy::ToolCommand;
+use softvt_records::record::EpisodeRecord;
 
 pub use foreign::{
     ForeignDemo, ForeignFile, ForeignFormat, ForeignObjectPose, ForeignTask, InitialCondition,
@@ -59,6 +61,7 @@ fn softvt_demo(reader: DemoReader) -> Result<ForeignDemo, DatasetError> {
         let what = format!("its split is {}; expected demonstration", id.split.name());
         return Err(reader.error("metadata_json", what));
     }
+    check_attributes(reader, &record)?;
     let commands: Vec<ToolCommand> =
         reader.file.actions(reader.demo)?.into_iter().map(ToolCommand::from).collect();
     let binary = reader.rows::<7>("actions_binary", Some(commands.len()))?;
@@ -80,6 +83,56 @@ fn softvt_demo(reader: DemoReader) -> Result<ForeignDemo, DatasetError> {
         command_source: "its actions, from the start of its own episode",
     })
 }
+
+/// Checks that the attributes and times of a demonstration are those of its record, which decides what is imported.
+///
+/// # Errors
+/// An attribute or a time differs from the record.
+fn check_attributes(reader: DemoReader, record: &EpisodeRecord) -> Result<(), DatasetError> {
+    let DemoReader { file, demo } = reader;
+    let (header, id) = (&record.header, &record.header.id);
+    let refuse = |name: &str, what: String| {
+        Err(DatasetError::content(&file.path, format!("/data/demo_{demo}, attribute {name}"), what))
+    };
+    for (name, recorded) in [
+        ("language", &header.prompt),
+        ("task_suite", &id.suite),
+        ("asset_name", &header.asset),
+        ("state_hash", &record.stats.state_hash),
+    ] {
+        if let Ok(stated) = file.text(demo, name)
+            && stated != *recorded
+        {
+            let what = format!(
+                "{stated:?}, and metadata_json says {recorded:?}; the record decides: relabel the imported demonstrations instead"
+            );
+            return refuse(name, what);
+        }
+    }
+    for (name, recorded) in [("task_id", id.task as u64), ("attempt", u64::from(id.episode))] {
+        if file.contradicts(demo, name, recorded) {
+            return refuse(name, format!("not {recorded}, which metadata_json says and which decides"));
+        }
+    }
+    if !reader.has("timestamps") {
+        return Ok(());
+    }
+    let times = reader.array("timestamps")?.values;
+    let is_late = |(step, time): &(usize, &f64)| (*time - *step as f64 * CONTROL_DT).abs() > TIME_TOLERANCE;
+    match times.iter().enumerate().find(is_late) {
+        Some((step, time)) => {
+            let expected = step as f64 * CONTROL_DT;
+            Err(reader.error(
+                "timestamps",
+                format!("step {step}: {time} s, expected {expected} s: control steps are 0.05 s"),
+            ))
+        }
+        None => Ok(()),
+    }
+}
+
+/// Largest error of times, s.
+const TIME_TOLERANCE: f64 = 1e-6;
 
 /// SHA-256 of a file, hexadecimal.
 fn sha256(path: &Path) -> Result<String, DatasetError> {
