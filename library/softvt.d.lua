@@ -811,7 +811,7 @@ local Shape = {}
 function Shape:translate(x, y, z) end
 
 ---@nodiscard
----Stretches the shape by factors along x, y and z; a single factor holds for all axes.
+---Stretches the shape by factors along x, y and z, or by a single factor along all axes.
 ---@param x number
 ---@param y? number
 ---@param z? number

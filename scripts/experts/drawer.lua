@@ -139,7 +139,8 @@ local function close(arm, scene, spec)
   end
 end
 
-local function make(_, spec)
+local function make(_, spec, surplus)
+  if surplus ~= nil then error("drawer: expected one table", 2) end
   softvt.check_fields("drawer", spec, FIELDS)
   local full = {
     joint = spec.joint,

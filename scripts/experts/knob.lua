@@ -150,7 +150,8 @@ local function stroke(arm, scene, spec, home)
   posture.down(arm, home)
 end
 
-local function make(_, spec)
+local function make(_, spec, surplus)
+  if surplus ~= nil then error("knob: expected one table", 2) end
   softvt.check_fields("knob", spec, FIELDS)
   local full = { joint = spec.joint, angle = spec.angle, speed = spec.speed or SPEED }
   if math.abs(full.angle) > 2 * math.pi then

@@ -239,7 +239,8 @@ local function complete(spec)
   return full
 end
 
-local function make(_, spec)
+local function make(_, spec, surplus)
+  if surplus ~= nil then error("pick_place: expected one table", 2) end
   softvt.check_fields("pick_place", spec, FIELDS)
   spec = complete(spec)
   local function run(arm, scene)

@@ -73,7 +73,8 @@ local function attempt(arm, scene, spec, place)
   arm:release { closure = 0.5, rate = 1 }
 end
 
-local function make(_, spec)
+local function make(_, spec, surplus)
+  if surplus ~= nil then error("push: expected one table", 2) end
   softvt.check_fields("push", spec, FIELDS)
   local full = {
     object = spec.object,

@@ -9,7 +9,8 @@ local function description(value)
   return name and ("%s, which makes one; call it: %s { … }"):format(name, name) or "a " .. type(value)
 end
 
-local function make(_, experts)
+local function make(_, experts, surplus)
+  if surplus ~= nil then error("sequence: expected one list of experts", 2) end
   if type(experts) ~= "table" or #experts == 0 then error("sequence: expected a list of experts", 2) end
   for k, expert in ipairs(experts) do
     if type(expert) ~= "function" then

@@ -51,7 +51,8 @@ local function check(name, arguments, types)
 end
 
 -- Adds normal noise to the arm's initial joint angles.
-function arrange.arm(scene, rng)
+function arrange.arm(scene, rng, surplus)
+  if surplus ~= nil then error("arrange.arm: expected the scene and the layout's random numbers alone", 2) end
   if rng == nil then error("arrange.arm: expected the layout's random numbers as the second argument: arrange.arm(scene, rng)", 2) end
   local joints, noise = scene.start_q, rng:stream "arm"
   for i = 1, #joints do
@@ -183,7 +184,8 @@ end
 --
 -- Reachable objects are drawn first and keep their positions while the others are redrawn. Their distribution therefore
 -- does not depend on the other objects.
-function arrange.scatter(rng, objects, clearance)
+function arrange.scatter(rng, objects, clearance, surplus)
+  if surplus ~= nil then error("arrange.scatter: expected rng, objects and clearance alone", 2) end
   check(
     "arrange.scatter",
     { rng = rng, objects = objects, clearance = clearance },
@@ -195,7 +197,8 @@ function arrange.scatter(rng, objects, clearance)
 end
 
 -- Draws positions as arrange.scatter does and adds the objects to the scene.
-function arrange.add(scene, rng, objects, clearance)
+function arrange.add(scene, rng, objects, clearance, surplus)
+  if surplus ~= nil then error("arrange.add: expected scene, rng, objects and clearance alone", 2) end
   check(
     "arrange.add",
     { scene = scene, rng = rng, objects = objects, clearance = clearance },

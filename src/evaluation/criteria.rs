@@ -11,18 +11,18 @@ softvt_common::settings! {
         /// Minimum force that counts as contact, of a pad, another part of the robot or a support.
         touch_force_n: f64 = 1e-3, "N", Range::NOT_NEGATIVE;
         /// Minimum rise of a body's lowest point above its settled height that counts as lifted.
-        lift_height_m: f64 = 0.005, "m", Range::NOT_NEGATIVE;
+        lift_height_m: f64 = 0.005, "m", Range::closed(0.0, 0.5);
         /// Time without pad contact after which a grasp may count as lost, s (0.15 s: three control steps).
         lost_contact_s: f64 = 0.15, "s", Range::NOT_NEGATIVE;
         /// Fall relative to the hand beyond which a lost grasp is a drop.
-        lost_fall_m: f64 = 0.020, "m", Range::NOT_NEGATIVE;
+        lost_fall_m: f64 = 0.020, "m", Range::closed(0.0, 0.5);
         /// Length of a free fall beyond which it is a drop, before or after the release.
-        free_fall_m: f64 = 0.050, "m", Range::NOT_NEGATIVE;
+        free_fall_m: f64 = 0.050, "m", Range::closed(0.0, 0.5);
         /// Excess of the commanded over the measured gripper width that counts as a release command.
-        release_margin_m: f64 = 0.005, "m", Range::NOT_NEGATIVE;
+        release_margin_m: f64 = 0.005, "m", Range::closed(0.0, 0.5);
         /// Largest allowed distance that the object slides along a pad while the pads alone carry it, m: NoSlip, which
         /// is not part of NoDrop.
-        slip_m: f64 = 0.002, "m", Range::NOT_NEGATIVE;
+        slip_m: f64 = 0.002, "m", Range::closed(0.0, 0.5);
         /// True if Safety Success needs NoSlip.
         require_no_slip: bool = false;
         /// Largest grip ratio of a gentle grip.
@@ -30,11 +30,11 @@ softvt_common::settings! {
         /// Minimum share of the target's weight that the goal must carry, 0 to 1.
         support_share: f64 = 0.5, "", Range::closed(0.0, 1.0);
         /// Distance of the centre beyond the goal's edge at which a placed object has left the goal.
-        leave_margin_m: f64 = 0.005, "m", Range::NOT_NEGATIVE;
+        leave_margin_m: f64 = 0.005, "m", Range::closed(0.0, 0.5);
         /// Horizontal and vertical distance within which SoftVTBench's released code counts an object as "on".
-        goal_v1_on_m: f64 = 0.10, "m", Range::NOT_NEGATIVE;
+        goal_v1_on_m: f64 = 0.10, "m", Range::closed(0.0, 2.0);
         /// Horizontal and vertical distance within which SoftVTBench's released code counts an object as "in".
-        goal_v1_in_m: f64 = 0.20, "m", Range::NOT_NEGATIVE;
+        goal_v1_in_m: f64 = 0.20, "m", Range::closed(0.0, 2.0);
     }
 }
 
@@ -48,7 +48,7 @@ mod tests {
         assert_eq!(SuccessCriteria::default().check("criteria"), Ok(()));
         let slip =
             SuccessCriteria { slip_m: -0.001, ..SuccessCriteria::default() }.check("criteria").unwrap_err();
-        assert_eq!(slip.to_string(), "criteria.slip_m: expected a number of 0 or more (m), got -0.001");
+        assert_eq!(slip.to_string(), "criteria.slip_m: expected a number in 0..0.5 (m), got -0.001");
         assert!(
             SuccessCriteria { lost_fall_m: f64::NAN, ..SuccessCriteria::default() }
                 .check("criteria")

@@ -389,9 +389,13 @@ class! {
             fn translate(lua, this, x: f64 = METRES, y: f64 = METRES, z: f64 = METRES) -> ["softvt.Shape"] {
                 this.derived(lua, this.copy().translated(Vec3::new(x, y, z)), &[])?
             }
-            /// Stretches the shape by factors along x, y and z; a single factor holds for all axes.
+            /// Stretches the shape by factors along x, y and z, or by a single factor along all axes.
             fn scale(lua, this, x: f64, y: Option<f64>, z: Option<f64>) -> ["softvt.Shape"] {
-                let factors = Vec3::new(x, y.unwrap_or(x), z.unwrap_or(x));
+                let factors = match (y, z) {
+                    (None, None) => Vec3::repeat(x),
+                    (Some(y), Some(z)) => Vec3::new(x, y, z),
+                    _ => return Err(fail(lua, "shape:scale: expected one factor or three, got two")),
+                };
                 this.derived(lua, this.copy().scaled(factors), &[])?
             }
             /// Grows the shape by a radius (m), which rounds convex edges.

@@ -431,6 +431,12 @@ pub(crate) fn suite(lua: &Lua, spec: &Constructed<SuiteSpec>) -> mlua::Result<Su
         }
         tasks.push(task);
     }
+    let is_twice = |at: &usize| spec.shifts[..*at].iter().any(|shift| shift.name == spec.shifts[*at].name);
+    if let Some(at) = (1..spec.shifts.len()).find(is_twice) {
+        let message =
+            format!("suite.shifts: two are named {:?}; give each a name of its own", spec.shifts[at].name);
+        return Err(fail_at_key(lua, &spec.table, "shifts", message));
+    }
     let shifts = spec.shifts.iter().map(|shift| Shift {
         name: shift.name.clone(),
         unit: shift.unit.clone(),
@@ -511,7 +517,7 @@ fn task(lua: &Lua, id: usize, spec: &Constructed<TaskSpec>, budget: u32) -> mlua
             return Err(fail_at_key(lua, table, "range", message));
         }
     }
-    if spec.prompt.contains(char::is_control) {
+    if spec.prompt.contains(char::is_control) || spec.prompt.trim().is_empty() {
         let message = format!("task.prompt: expected one line of text, got {:?}", spec.prompt);
         return Err(fail_at_key(lua, &spec.table, "prompt", message));
     }

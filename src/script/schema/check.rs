@@ -1,5 +1,7 @@
 //! Checks values against their declared types, and reports the line of the offending key.
 
+use std::f64::consts::TAU;
+
 use mlua::{Lua, Table, Value};
 
 use super::{Field, FieldDefault, Range, Record, Type, ValidationError, joined};
@@ -9,7 +11,7 @@ use crate::vm::{
     source_map,
     value::{describe, number, sorted_pairs},
 };
-use softvt_common::text::{MAX_TEXT_BYTES, suggest, unknown_name};
+use softvt_common::text::{MAX_TEXT_BYTES, format_number, suggest, unknown_name};
 
 /// Numbers whose largest magnitude is smaller have no direction.
 pub(crate) const MIN_LENGTH: f64 = 1e-9;
@@ -64,8 +66,17 @@ impl Type {
                     None => Err(wrong()),
                 }
             }
-            (Self::Vector(count, _, range), Value::Table(list)) => {
-                self.check_numbers(lua, list, *count, *range).map(|(list, _)| list)
+            (Self::Vector(count, unit, range), Value::Table(list)) => {
+                let (list, numbers) = self.check_numbers(lua, list, *count, *range)?;
+                let turn = numbers.iter().map(|x| x * x).sum::<f64>().sqrt();
+                if *count == 3 && unit.starts_with("rad") && turn > TAU {
+                    let expected = "expected an axis-angle of at most a full turn, 2π rad";
+                    let got = format_number(turn);
+                    return Err(ValidationError::new(format!(
+                        "{expected}, got {got} rad; math.rad converts degrees"
+                    )));
+                }
+                Ok(list)
             }
             (Self::Direction(..), Value::Table(list)) => self.check_length(lua, list, 3, "a direction"),
             (Self::Quaternion(_), Value::Table(list)) => self.check_length(lua, list, 4, "a quaternion"),

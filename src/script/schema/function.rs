@@ -3,7 +3,8 @@
 use mlua::{Lua, MultiValue, Table, Value};
 
 use super::{FieldDefault, Type, error_at_key};
-use crate::vm::error::fail;
+use crate::vm::{error::fail, value::describe};
+use softvt_common::text::counted;
 
 /// A function or method.
 #[derive(Clone, Copy, Debug)]
@@ -58,14 +59,14 @@ impl Signature {
     }
 }
 
-/// Checks the arguments of a call, and fills in the defaults of tables; more arguments are ignored, as in Lua.
+/// Checks the arguments of a call, and fills in the defaults of tables. Unlike in Lua, more arguments are an error.
 pub(crate) fn arguments(
     lua: &Lua,
     label: &str,
     signature: &Signature,
     values: impl IntoIterator<Item = Value>,
 ) -> mlua::Result<MultiValue> {
-    let mut values = values.into_iter();
+    let mut values = values.into_iter().fuse();
     let checked = signature.params.iter().map(|param| {
         let value = match (values.next().unwrap_or(Value::Nil), param.presence) {
             (value, _) if !param.checked => return Ok(value),
@@ -79,7 +80,14 @@ pub(crate) fn arguments(
             _ => fail(lua, error.describe(&format!("{label}: {}", param.name))),
         })
     });
-    checked.collect()
+    let checked = checked.collect::<mlua::Result<MultiValue>>()?;
+    match values.find(|value| !value.is_nil()) {
+        None => Ok(checked),
+        Some(surplus) => {
+            let expected = counted(signature.params.len(), "argument");
+            Err(fail(lua, format!("{label}: expected {expected}, got {} as well", describe(&surplus))))
+        }
+    }
 }
 
 /// Declares variables for the checked arguments of a call: the parameters, and the fields of the table that comes last.
