@@ -206,6 +206,12 @@ impl StoredRun {
                 self.requested_episodes()
             ));
         }
+        let shard = self.text("shard");
+        if !shard.is_empty() {
+            warnings.push(format!(
+                "{dir} is the shard {shard} of a run, which softvt merge joins with the others"
+            ));
+        }
         if self.is_truncated {
             warnings.push(format!(
                 "the last line of {dir}/{EPISODES} is truncated and was skipped; a resumed run executes that episode again"

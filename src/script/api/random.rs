@@ -10,7 +10,7 @@ use crate::{
     vm::error::fail,
 };
 use softvt_benchmark::seed::{self, EpisodeSeed, RandomStream};
-use softvt_common::parallel::lock;
+use softvt_common::{parallel::lock, text::format_number};
 
 /// `softvt.Rng`.
 #[derive(Clone)]
@@ -48,10 +48,18 @@ class! {
             }
             /// Returns a number uniformly distributed from low (included) to high (excluded).
             fn uniform(lua, this, low: f64, high: f64) -> ["number"] {
+                if low > high {
+                    let [low, high] = [low, high].map(format_number);
+                    return Err(fail(lua, format!("rng:uniform: the range {low}..{high} is empty; swap them")));
+                }
                 finite(lua, "uniform", low + (high - low) * seed::uniform(&mut lock(&this.draws)))?
             }
             /// Returns a normally distributed number; sigma is the standard deviation.
             fn normal(lua, this, mean: f64, sigma: f64) -> ["number"] {
+                if sigma < 0.0 {
+                    let sigma = format_number(sigma);
+                    return Err(fail(lua, format!("rng:normal: sigma: expected a number of 0 or more, got {sigma}")));
+                }
                 finite(lua, "normal", mean + sigma * seed::standard_normal(&mut lock(&this.draws)))?
             }
             /// Returns a whole number from low to high, both included.
