@@ -1,8 +1,9 @@
 //! Import of triangle meshes from OBJ, STL and binary glTF (GLB) files.
 
 mod glb;
+mod obj;
 
-use std::{cell::RefCell, collections::BTreeSet, io::Cursor, sync::Arc};
+use std::{io::Cursor, sync::Arc};
 
 use super::{
     Mat3, Vec3,
@@ -123,7 +124,7 @@ pub fn import_colours(
     read_file: &dyn Fn(&str) -> Result<Vec<u8>, String>,
 ) -> Result<ImportedColours, String> {
     match format {
-        MeshFormat::Obj => obj_colours(bytes, read_file),
+        MeshFormat::Obj => obj::colours(bytes, read_file),
         MeshFormat::Stl => Ok(ImportedColours::default()),
         MeshFormat::Gltf => glb::colours(bytes),
     }
@@ -145,7 +146,7 @@ pub fn import(
         return Err(MeshImportError::Scale(options.scale));
     }
     let mut mesh = match format {
-        MeshFormat::Obj => read_obj(bytes)?,
+        MeshFormat::Obj => obj::read(bytes)?,
         MeshFormat::Stl => read_stl(bytes)?,
         MeshFormat::Gltf => glb::read(bytes)?,
     };
@@ -166,86 +167,6 @@ fn check_size(vertices: usize, triangles: usize) -> Result<(), MeshImportError> 
     check("vertices", vertices, MAX_VERTICES)
 }
 
-const OBJ_OPTIONS: tobj::LoadOptions =
-    tobj::LoadOptions { single_index: true, triangulate: true, ignore_points: false, ignore_lines: false };
-
-fn obj_colours(
-    bytes: &[u8],
-    read_file: &dyn Fn(&str) -> Result<Vec<u8>, String>,
-) -> Result<ImportedColours, String> {
-    let problem = RefCell::new(None);
-    let libraries = RefCell::new(Vec::new());
-    let load = |path: &std::path::Path| {
-        let path = path.to_string_lossy();
-        let text = read_file(&path).map_err(|error| {
-            problem.borrow_mut().get_or_insert(error);
-            tobj::LoadError::OpenFileFailed
-        })?;
-        let loaded = tobj::load_mtl_buf(&mut Cursor::new(text)).inspect_err(|error| {
-            problem.borrow_mut().get_or_insert(format!("{path}: {error}; export it again"));
-        })?;
-        let names = loaded.1.keys().cloned().collect();
-        libraries.borrow_mut().push(MaterialLibrary { path: path.into_owned(), names });
-        Ok(loaded)
-    };
-    let loaded = tobj::load_obj_buf(&mut Cursor::new(bytes), &OBJ_OPTIONS, load);
-    let (models, materials) = loaded.map_err(|error| error.to_string())?;
-    if let Some(problem) = problem.into_inner() {
-        return Err(problem);
-    }
-    check_material_names(bytes, &libraries.into_inner())?;
-    // Without any material file this is an error of the library.
-    let mut materials: Vec<ImportedMaterial> =
-        materials.unwrap_or_default().into_iter().map(material_of_mtl).collect::<Result<_, String>>()?;
-    if materials.is_empty() {
-        return Ok(ImportedColours::default());
-    }
-    let plain = plain_id(materials.len())?;
-    materials.push(ImportedMaterial::default());
-    let ids = models.iter().flat_map(|model| {
-        let id = model.mesh.material_id.map_or(plain, |id| id as u16);
-        std::iter::repeat_n(id, model.mesh.indices.len() / 3)
-    });
-    Ok(ImportedColours { material_ids: ids.collect(), materials })
-}
-
-/// An MTL file that an OBJ file names.
-struct MaterialLibrary {
-    path: String,
-    names: BTreeSet<String>,
-}
-
-/// Refuses materials that no library above their use has, of a file with `libraries` in order.
-fn check_material_names(obj: &[u8], libraries: &[MaterialLibrary]) -> Result<(), String> {
-    let mut known = 0;
-    for line in String::from_utf8_lossy(obj).lines() {
-        let name = || line.trim().split_once(' ').map_or("", |(_, name)| name.trim());
-        match line.split_whitespace().next() {
-            Some("mtllib") => known += 1,
-            Some("usemtl") => {
-                let has = |library: &MaterialLibrary| library.names.contains(name());
-                if libraries.iter().take(known).any(has) {
-                    continue;
-                }
-                let name = shortened(name());
-                if let Some(later) = libraries.iter().find(|library| has(library)) {
-                    let path = shortened(&later.path);
-                    return Err(format!("usemtl {name} is above mtllib {path}; move mtllib to the top"));
-                }
-                return Err(match libraries.last() {
-                    Some(last) => {
-                        let path = shortened(&last.path);
-                        format!("{path} has no material {name}; add it there, or correct usemtl")
-                    }
-                    None => format!("usemtl {name}: the file names no mtllib; add it, or remove usemtl"),
-                });
-            }
-            _ => {}
-        }
-    }
-    Ok(())
-}
-
 /// The name of a file or material for a message.
 fn shortened(name: &str) -> String {
     const MOST: usize = 80;
@@ -257,63 +178,6 @@ fn shortened(name: &str) -> String {
 fn plain_id(count: usize) -> Result<u16, String> {
     let most = u16::MAX;
     u16::try_from(count).map_err(|_| format!("has {count} materials; at most {most} are drawn, merge some"))
-}
-
-fn material_of_mtl(material: tobj::Material) -> Result<ImportedMaterial, String> {
-    // Options before the name, such as "-bm 1", are not followed.
-    let image = material.diffuse_texture.map(|text| match text.starts_with('-') {
-        true => text.split_whitespace().next_back().unwrap_or_default().to_owned(),
-        false => text.trim().to_owned(),
-    });
-    let plain = ImportedMaterial::default();
-    let albedo = match (&image, material.diffuse) {
-        // Exporters write a grey beside an image.
-        (Some(_), _) => [1.0; 3],
-        (None, Some(colour)) if colour.iter().all(|x| (0.0..=1.0).contains(x)) => colour.map(f64::from),
-        (None, Some([r, g, b])) => {
-            let name = shortened(&material.name);
-            return Err(format!(
-                "material {name}: Kd is {r} {g} {b}; give shares of 1, such as 0.5 for 128 of 255"
-            ));
-        }
-        (None, None) => plain.albedo,
-    };
-    Ok(ImportedMaterial { albedo, image: image.map(ImportedImage::File), ..plain })
-}
-
-fn read_obj(bytes: &[u8]) -> Result<Mesh, MeshImportError> {
-    let unreadable = |reason: String| MeshImportError::Unreadable { format: "OBJ", reason };
-    // Materials split meshes, which would change the order of vertices: `obj_colours` reads them separately.
-    let no_materials = |_: &std::path::Path| Err(tobj::LoadError::OpenFileFailed);
-    let (models, _) = tobj::load_obj_buf(&mut Cursor::new(bytes), &OBJ_OPTIONS, no_materials)
-        .map_err(|error| unreadable(error.to_string()))?;
-    // The reader numbers vertices by their first use.
-    let is_bad = |line: &str| {
-        let mut words = line.split_whitespace();
-        let is_number = |word: &str| word.parse::<f64>().is_ok_and(f64::is_finite);
-        words.next() == Some("v") && !words.take(3).all(is_number)
-    };
-    if let Some(at) = String::from_utf8_lossy(bytes).lines().position(is_bad) {
-        return Err(unreadable(format!("line {} has a coordinate that is not a number", at + 1)));
-    }
-    let mut out = Mesh::default();
-    let textured = models.iter().any(|model| !model.mesh.texcoords.is_empty());
-    for tobj::Model { mesh, .. } in &models {
-        let base = out.vertices.len() as u32;
-        let place = |p: &[f32]| Vec3::new(f64::from(p[0]), f64::from(p[1]), f64::from(p[2]));
-        out.vertices.extend(mesh.positions.chunks_exact(3).map(place));
-        for t in mesh.indices.chunks_exact(3) {
-            out.triangles.push([t[0] + base, t[1] + base, t[2] + base]);
-            if textured {
-                let uv = |v: u32| {
-                    let at = 2 * v as usize;
-                    mesh.texcoords.get(at..at + 2).map_or([0.0; 2], |uv| [uv[0], uv[1]].map(f64::from))
-                };
-                out.uvs.push([uv(t[0]), uv(t[1]), uv(t[2])]);
-            }
-        }
-    }
-    Ok(out)
 }
 
 /// Bytes before the triangles of a binary STL file, the last four of which count them, and of a triangle.

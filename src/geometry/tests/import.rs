@@ -289,6 +289,44 @@ fn materials_of_obj_files_are_those_of_their_mtl_files() {
 }
 
 #[test]
+fn no_line_of_an_mtl_file_panics_and_keywords_may_have_capitals() {
+    let colours = |obj: &str, mtl: &str| {
+        import_colours(obj.as_bytes(), MeshFormat::Obj, &|_| Ok(mtl.as_bytes().to_vec()))
+            .map(|colours| colours.materials[0].albedo)
+    };
+    let obj = format!("mtllib c.mtl\nusemtl m\n{CUBE}");
+    let kd = |text: &str| colours(&obj, &format!("newmtl m\n{text}\n"));
+    assert_eq!(kd("Kd 0.5"), Ok([0.5; 3]), "a grey: green and blue are equal to red");
+    for ignored in
+        ["Ks 1", "Ka", "Ke 1 1", "Ns", "Ni x", "d", "illum", "map_Ks", "bump", "Tf xyz 1", "# Kd 1", "é"]
+    {
+        assert_eq!(kd(&format!("{ignored}\nKd 1 0 0")), Ok([1.0, 0.0, 0.0]), "{ignored}");
+    }
+    for (text, expected) in [
+        ("Kd", "c.mtl line 2: Kd is \"\"; give three shares of 1, or one for a grey"),
+        ("Kd 1 0", "c.mtl line 2: Kd is \"1 0\"; give three shares of 1, or one for a grey"),
+        (
+            "Kd spectral a.rfl",
+            "c.mtl line 2: Kd is \"spectral a.rfl\"; give three shares of 1, or one for a grey",
+        ),
+        ("map_Kd", "c.mtl line 2: map_Kd names no image; add its file, or remove the line"),
+        ("newmtl ", "c.mtl line 2: newmtl has no name; add it"),
+    ] {
+        assert_eq!(kd(text), Err(expected.to_owned()));
+    }
+    assert_eq!(
+        colours(&obj, "Kd 1\nnewmtl m"),
+        Err("c.mtl line 1: Kd is above newmtl; move it below".to_owned())
+    );
+    assert!(kd("Kd nan").expect_err("no share").contains("Kd is NaN NaN NaN; give shares of 1"));
+    assert_eq!(colours(&obj, "\u{feff}NEWMTL\tm\n  KD 0 1 0\n"), Ok([0.0, 1.0, 0.0]));
+    let capitals = obj.replace("mtllib ", "MTLLIB\t").replace("usemtl ", "USEMTL\t");
+    assert_eq!(colours(&capitals, "newmtl m\nKd 0 1 0\n"), Ok([0.0, 1.0, 0.0]));
+    let capitals = format!("\u{feff}{}", CUBE.replace('v', "V").replace('f', "F\t"));
+    assert_eq!(read_obj(&capitals), read_obj(CUBE));
+}
+
+#[test]
 fn more_materials_than_indices_are_refused() {
     let mtl: String = (0..=u16::MAX).map(|i| format!("newmtl m{i}\n")).collect();
     let most = mtl.strip_suffix("newmtl m65535\n").expect("the last").to_owned();

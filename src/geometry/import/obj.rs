@@ -1,0 +1,202 @@
+//! Wavefront OBJ, by the crate `tobj`, and the colours of its MTL files. Those are read here: the crate panics on
+//! colours of fewer than three numbers, and fails on lines that state no colour.
+
+use std::{cell::RefCell, collections::BTreeSet, io::Cursor};
+
+use super::{ImportedColours, ImportedImage, ImportedMaterial, MeshImportError, plain_id, shortened};
+use crate::{Vec3, mesh::Mesh};
+
+const OBJ_OPTIONS: tobj::LoadOptions =
+    tobj::LoadOptions { single_index: true, triangulate: true, ignore_points: false, ignore_lines: false };
+
+pub(super) fn colours(
+    bytes: &[u8],
+    read_file: &dyn Fn(&str) -> Result<Vec<u8>, String>,
+) -> Result<ImportedColours, String> {
+    let problem = RefCell::new(None);
+    let libraries = RefCell::new(Vec::new());
+    let load = |path: &std::path::Path| {
+        let path = path.to_string_lossy();
+        let read = read_file(&path).and_then(|bytes| read_materials(&path, &String::from_utf8_lossy(&bytes)));
+        let materials = read.map_err(|error| {
+            problem.borrow_mut().get_or_insert(error);
+            tobj::LoadError::MaterialParseError
+        })?;
+        let names = materials.iter().map(|material| material.name.clone()).collect();
+        let ids = materials.iter().zip(0..).map(|(material, id)| (material.name.clone(), id)).collect();
+        libraries.borrow_mut().push(MaterialLibrary { path: path.into_owned(), names });
+        Ok((materials, ids))
+    };
+    let text = normalised(bytes);
+    let loaded = tobj::load_obj_buf(&mut Cursor::new(&text), &OBJ_OPTIONS, load);
+    let (models, materials) = loaded.map_err(|error| error.to_string())?;
+    if let Some(problem) = problem.into_inner() {
+        return Err(problem);
+    }
+    check_material_names(&text, &libraries.into_inner())?;
+    // Without any material file this is an error of the library.
+    let mut materials: Vec<ImportedMaterial> =
+        materials.unwrap_or_default().into_iter().map(material_of_mtl).collect::<Result<_, String>>()?;
+    if materials.is_empty() {
+        return Ok(ImportedColours::default());
+    }
+    let plain = plain_id(materials.len())?;
+    materials.push(ImportedMaterial::default());
+    let ids = models.iter().flat_map(|model| {
+        let id = model.mesh.material_id.map_or(plain, |id| id as u16);
+        std::iter::repeat_n(id, model.mesh.indices.len() / 3)
+    });
+    Ok(ImportedColours { material_ids: ids.collect(), materials })
+}
+
+/// An MTL file that an OBJ file names.
+struct MaterialLibrary {
+    path: String,
+    names: BTreeSet<String>,
+}
+
+/// Refuses materials that no library above their use has, of a file with `libraries` in order.
+fn check_material_names(obj: &str, libraries: &[MaterialLibrary]) -> Result<(), String> {
+    let mut known = 0;
+    for line in obj.lines() {
+        let name = || line.trim().split_once(' ').map_or("", |(_, name)| name.trim());
+        match line.split_whitespace().next() {
+            Some("mtllib") => known += 1,
+            Some("usemtl") => {
+                let has = |library: &MaterialLibrary| library.names.contains(name());
+                if libraries.iter().take(known).any(has) {
+                    continue;
+                }
+                let name = shortened(name());
+                if let Some(later) = libraries.iter().find(|library| has(library)) {
+                    let path = shortened(&later.path);
+                    return Err(format!("usemtl {name} is above mtllib {path}; move mtllib to the top"));
+                }
+                return Err(match libraries.last() {
+                    Some(last) => {
+                        let path = shortened(&last.path);
+                        format!("{path} has no material {name}; add it there, or correct usemtl")
+                    }
+                    None => format!("usemtl {name}: the file names no mtllib; add it, or remove usemtl"),
+                });
+            }
+            _ => {}
+        }
+    }
+    Ok(())
+}
+
+/// The text of an OBJ file for the crate, which knows keywords in lower case before a space.
+fn normalised(bytes: &[u8]) -> String {
+    let mut text = String::with_capacity(bytes.len());
+    for line in String::from_utf8_lossy(bytes).trim_start_matches(BYTE_ORDER_MARK).lines() {
+        let (keyword, rest) = keyword_and_rest(line);
+        text.extend([&keyword.to_ascii_lowercase(), " ", rest, "\n"]);
+    }
+    text
+}
+
+/// What editors of Windows write before a text.
+const BYTE_ORDER_MARK: char = '\u{feff}';
+
+fn keyword_and_rest(line: &str) -> (&str, &str) {
+    let line = line.trim();
+    line.split_once(char::is_whitespace).map_or((line, ""), |(keyword, rest)| (keyword, rest.trim_start()))
+}
+
+/// The materials of the MTL file `path`, of which names, `Kd` and `map_Kd` matter.
+fn read_materials(path: &str, text: &str) -> Result<Vec<tobj::Material>, String> {
+    let mut materials: Vec<tobj::Material> = Vec::new();
+    for (line, number) in text.trim_start_matches(BYTE_ORDER_MARK).lines().zip(1..) {
+        let (keyword, rest) = keyword_and_rest(line);
+        let refuse = |problem: &str| Err(format!("{} line {number}: {problem}", shortened(path)));
+        match (keyword.to_ascii_lowercase().as_str(), materials.last_mut()) {
+            ("newmtl", _) if rest.is_empty() => return refuse("newmtl has no name; add it"),
+            ("newmtl", _) => {
+                materials.push(tobj::Material { name: rest.to_owned(), ..tobj::Material::default() });
+            }
+            ("kd" | "map_kd", None) => return refuse(&format!("{keyword} is above newmtl; move it below")),
+            ("kd", Some(material)) => match colour(rest) {
+                Some(colour) => material.diffuse = Some(colour),
+                None => {
+                    let rest = shortened(rest);
+                    return refuse(&format!("Kd is {rest:?}; give three shares of 1, or one for a grey"));
+                }
+            },
+            ("map_kd", _) if rest.is_empty() => {
+                return refuse("map_Kd names no image; add its file, or remove the line");
+            }
+            ("map_kd", Some(material)) => material.diffuse_texture = Some(rest.to_owned()),
+            _ => {}
+        }
+    }
+    Ok(materials)
+}
+
+/// Red, green and blue of a colour; a single number is all of them.
+fn colour(words: &str) -> Option<[f32; 3]> {
+    let numbers: Vec<f32> = words.split_whitespace().map(|word| word.parse().ok()).collect::<Option<_>>()?;
+    match numbers[..] {
+        [grey] => Some([grey; 3]),
+        [r, g, b] => Some([r, g, b]),
+        _ => None,
+    }
+}
+
+fn material_of_mtl(material: tobj::Material) -> Result<ImportedMaterial, String> {
+    // Options before the name, such as "-bm 1", are not followed.
+    let image = material.diffuse_texture.map(|text| match text.starts_with('-') {
+        true => text.split_whitespace().next_back().unwrap_or_default().to_owned(),
+        false => text.trim().to_owned(),
+    });
+    let plain = ImportedMaterial::default();
+    let albedo = match (&image, material.diffuse) {
+        // Exporters write a grey beside an image.
+        (Some(_), _) => [1.0; 3],
+        (None, Some(colour)) if colour.iter().all(|x| (0.0..=1.0).contains(x)) => colour.map(f64::from),
+        (None, Some([r, g, b])) => {
+            let name = shortened(&material.name);
+            return Err(format!(
+                "material {name}: Kd is {r} {g} {b}; give shares of 1, such as 0.5 for 128 of 255"
+            ));
+        }
+        (None, None) => plain.albedo,
+    };
+    Ok(ImportedMaterial { albedo, image: image.map(ImportedImage::File), ..plain })
+}
+
+pub(super) fn read(bytes: &[u8]) -> Result<Mesh, MeshImportError> {
+    let unreadable = |reason: String| MeshImportError::Unreadable { format: "OBJ", reason };
+    // Materials split meshes, which would change the order of vertices: [`colours`] reads them separately.
+    let no_materials = |_: &std::path::Path| Err(tobj::LoadError::OpenFileFailed);
+    let text = normalised(bytes);
+    let (models, _) = tobj::load_obj_buf(&mut Cursor::new(&text), &OBJ_OPTIONS, no_materials)
+        .map_err(|error| unreadable(error.to_string()))?;
+    // The reader numbers vertices by their first use.
+    let is_bad = |line: &str| {
+        let mut words = line.split_whitespace();
+        let is_number = |word: &str| word.parse::<f64>().is_ok_and(f64::is_finite);
+        words.next() == Some("v") && !words.take(3).all(is_number)
+    };
+    if let Some(at) = text.lines().position(is_bad) {
+        return Err(unreadable(format!("line {} has a coordinate that is not a number", at + 1)));
+    }
+    let mut out = Mesh::default();
+    let textured = models.iter().any(|model| !model.mesh.texcoords.is_empty());
+    for tobj::Model { mesh, .. } in &models {
+        let base = out.vertices.len() as u32;
+        let place = |p: &[f32]| Vec3::new(f64::from(p[0]), f64::from(p[1]), f64::from(p[2]));
+        out.vertices.extend(mesh.positions.chunks_exact(3).map(place));
+        for t in mesh.indices.chunks_exact(3) {
+            out.triangles.push([t[0] + base, t[1] + base, t[2] + base]);
+            if textured {
+                let uv = |v: u32| {
+                    let at = 2 * v as usize;
+                    mesh.texcoords.get(at..at + 2).map_or([0.0; 2], |uv| [uv[0], uv[1]].map(f64::from))
+                };
+                out.uvs.push([uv(t[0]), uv(t[1]), uv(t[2])]);
+            }
+        }
+    }
+    Ok(out)
+}
