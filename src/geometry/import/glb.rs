@@ -54,40 +54,85 @@ pub(super) fn read(bytes: &[u8]) -> Result<Mesh, MeshImportError> {
 pub(super) fn colours(bytes: &[u8]) -> Result<ImportedColours, String> {
     let file = gltf::Gltf::from_slice(bytes).map_err(|error| error.to_string())?;
     let blob = file.blob.as_deref().unwrap_or_default();
-    if file.materials().len() == 0 {
+    let plain = plain_id(file.materials().len())?;
+    let mut surfaces = Surfaces { blob, plain, ..Surfaces::default() };
+    let scene = file.default_scene().or_else(|| file.scenes().next());
+    scene.iter().flat_map(gltf::Scene::nodes).try_for_each(|node| surfaces.add_node(&node))?;
+    if plain == 0 {
         return Ok(ImportedColours::default());
     }
-    let plain = plain_id(file.materials().len())?;
-    let mut material_ids = Vec::new();
-    let scene = file.default_scene().or_else(|| file.scenes().next());
-    for node in scene.iter().flat_map(gltf::Scene::nodes) {
-        add_material_ids(&node, plain, &mut material_ids);
-    }
+    let Surfaces { material_ids, unplaced, .. } = surfaces;
     let used: BTreeSet<u16> = material_ids.iter().copied().collect();
     let mut images = Images { blob, known: BTreeMap::new() };
-    let materials = (0..plain).zip(file.materials()).map(|(id, material)| match used.contains(&id) {
-        true => material_of(&material, &mut images).map_err(|error| format!("material {id}: {error}")),
-        false => Ok(ImportedMaterial::default()),
+    let materials = (0..plain).zip(file.materials()).map(|(id, material)| {
+        let read = match (used.contains(&id), unplaced.contains(&id)) {
+            (false, _) => Ok(ImportedMaterial::default()),
+            (true, true) if material.pbr_metallic_roughness().base_color_texture().is_some() => Err(format!(
+                "its image needs texture coordinates, but a mesh of it has no {TEXCOORD}; unwrap the mesh, or remove \
+                 the image"
+            )),
+            _ => material_of(&material, &mut images),
+        };
+        read.map_err(|error| format!("material {id}: {error}"))
     });
     let mut materials = materials.collect::<Result<Vec<_>, String>>()?;
     materials.push(ImportedMaterial::default());
     Ok(ImportedColours { materials, material_ids })
 }
 
-/// Appends the material of each triangle, in the order of [`Reader::add_node`].
-fn add_material_ids(node: &gltf::Node, plain: u16, ids: &mut Vec<u16>) {
-    for primitive in node.mesh().iter().flat_map(gltf::Mesh::primitives) {
-        let positions = || primitive.get(&Semantic::Positions);
-        let corners = primitive.indices().or_else(positions).map_or(0, |accessor| accessor.count());
-        let id = primitive.material().index().map_or(plain, |index| index as u16);
-        ids.extend(std::iter::repeat_n(id, corners / 3));
+/// What the primitives of a scene state of their colours.
+#[derive(Default)]
+struct Surfaces<'a> {
+    blob: &'a [u8],
+    /// Index of the material of primitives that name none.
+    plain: u16,
+    /// The material of each triangle, in the order of [`Reader::add_node`].
+    material_ids: Vec<u16>,
+    /// Materials of primitives without texture coordinates.
+    unplaced: BTreeSet<u16>,
+}
+
+impl Surfaces<'_> {
+    fn add_node(&mut self, node: &gltf::Node) -> Result<(), String> {
+        for primitive in node.mesh().iter().flat_map(gltf::Mesh::primitives) {
+            let positions = || primitive.get(&Semantic::Positions);
+            let corners = primitive.indices().or_else(positions).map_or(0, |accessor| accessor.count());
+            let id = primitive.material().index().map_or(self.plain, |index| index as u16);
+            self.material_ids.extend(std::iter::repeat_n(id, corners / 3));
+            if primitive.get(&Semantic::TexCoords(0)).is_none() {
+                self.unplaced.insert(id);
+            }
+            if !self.is_white(&primitive) {
+                return Err("it has colours of vertices (COLOR_0), which are not drawn; store them in materials or in \
+                            an image, or remove them"
+                    .to_owned());
+            }
+        }
+        node.children().try_for_each(|child| self.add_node(&child))
     }
-    node.children().for_each(|child| add_material_ids(&child, plain, ids));
+
+    /// True if the colours of the vertices, which multiply those of the material, change nothing.
+    fn is_white(&self, primitive: &gltf::Primitive) -> bool {
+        let Some(accessor) = primitive.get(&Semantic::Colors(0)) else { return true };
+        // The reader of the crate panics on other types.
+        if !is_colour(&accessor) || check_layout(0, "COLOR_0", &accessor).is_err() {
+            return false;
+        }
+        let colours = primitive.reader(|_| Some(self.blob)).read_colors(0);
+        colours.is_some_and(|colours| colours.into_rgb_f32().all(|rgb| rgb == [1.0; 3]))
+    }
 }
 
 fn material_of(material: &gltf::Material, images: &mut Images) -> Result<ImportedMaterial, String> {
     let surface = material.pbr_metallic_roughness();
-    let [r, g, b, _] = surface.base_color_factor().map(|x| f64::from(x).clamp(0.0, 1.0));
+    let factors = surface.base_color_factor();
+    let has_base_colour = factors != [1.0; 4] || surface.base_color_texture().is_some();
+    if material.pbr_specular_glossiness().is_some() && !has_base_colour {
+        return Err("its colour is that of KHR_materials_pbrSpecularGlossiness, which is not supported; export a base \
+                    colour (pbrMetallicRoughness)"
+            .to_owned());
+    }
+    let [r, g, b, _] = factors.map(|x| f64::from(x).clamp(0.0, 1.0));
     // With a texture the factors multiply its values, which are not read; both are 1 by default.
     let is_textured = surface.metallic_roughness_texture().is_some();
     let factor = |x: f32| (!is_textured).then_some(f64::from(x).clamp(0.0, 1.0));
@@ -304,6 +349,11 @@ fn is_index(accessor: &Accessor) -> bool {
 
 fn is_texture_coordinate(accessor: &Accessor) -> bool {
     accessor.dimensions() == Dimensions::Vec2
+        && matches!(accessor.data_type(), DataType::U8 | DataType::U16 | DataType::F32)
+}
+
+fn is_colour(accessor: &Accessor) -> bool {
+    matches!(accessor.dimensions(), Dimensions::Vec3 | Dimensions::Vec4)
         && matches!(accessor.data_type(), DataType::U8 | DataType::U16 | DataType::F32)
 }
 

@@ -35,8 +35,10 @@ pub(super) fn colours(
     }
     check_material_names(&text, &libraries.into_inner())?;
     // Without any material file this is an error of the library.
+    let materials = materials.unwrap_or_default();
+    models.iter().try_for_each(|model| check_drawn(&model.mesh, &materials))?;
     let mut materials: Vec<ImportedMaterial> =
-        materials.unwrap_or_default().into_iter().map(material_of_mtl).collect::<Result<_, String>>()?;
+        materials.into_iter().map(material_of_mtl).collect::<Result<_, String>>()?;
     if materials.is_empty() {
         return Ok(ImportedColours::default());
     }
@@ -47,6 +49,30 @@ pub(super) fn colours(
         std::iter::repeat_n(id, model.mesh.indices.len() / 3)
     });
     Ok(ImportedColours { material_ids: ids.collect(), materials })
+}
+
+/// Refuses colours of vertices, and an image without texture coordinates, of the faces of one material.
+fn check_drawn(mesh: &tobj::Mesh, materials: &[tobj::Material]) -> Result<(), String> {
+    let textured = mesh.material_id.and_then(|id| materials.get(id)).filter(|m| m.diffuse_texture.is_some());
+    match textured {
+        Some(material) if !all_placed(mesh) => Err(format!(
+            "material {}: map_Kd needs texture coordinates (vt), which a face of it lacks; unwrap the mesh, or remove \
+             map_Kd",
+            shortened(&material.name)
+        )),
+        // An image has them already, and white ones change nothing.
+        None if mesh.vertex_color.iter().any(|x| *x != 1.0) => {
+            Err("it has colours of vertices (v x y z r g b), which are not drawn; store them in materials or in an \
+                 image, or remove them"
+                .to_owned())
+        }
+        _ => Ok(()),
+    }
+}
+
+/// True if all vertices have texture coordinates.
+fn all_placed(mesh: &tobj::Mesh) -> bool {
+    mesh.texcoords.len() / 2 == mesh.positions.len() / 3
 }
 
 /// An MTL file that an OBJ file names.
@@ -94,6 +120,32 @@ fn normalised(bytes: &[u8]) -> String {
         text.extend([&keyword.to_ascii_lowercase(), " ", rest, "\n"]);
     }
     text
+}
+
+/// The text of an OBJ file whose corners without texture coordinates are given (0, 0).
+fn with_coordinates_everywhere(text: &str) -> String {
+    let corner = |corner: &str| {
+        let mut parts = corner.split('/');
+        let mut next = || parts.next().unwrap_or_default();
+        let (vertex, placed, normal) = (next(), next(), next());
+        let placed = match placed.parse::<i64>() {
+            Ok(index) if index > 0 => index.saturating_add(1).to_string(),
+            Ok(index) => index.to_string(),
+            Err(_) => "1".to_owned(),
+        };
+        format!(" {vertex}/{placed}/{normal}")
+    };
+    let mut all = "vt 0 0\n".to_owned();
+    for line in text.lines() {
+        match line.strip_prefix("f ") {
+            Some(corners) => {
+                all.extend(std::iter::once("f".to_owned()).chain(corners.split_whitespace().map(corner)))
+            }
+            None => all.push_str(line),
+        }
+        all.push('\n');
+    }
+    all
 }
 
 /// What editors of Windows write before a text.
@@ -169,9 +221,16 @@ pub(super) fn read(bytes: &[u8]) -> Result<Mesh, MeshImportError> {
     let unreadable = |reason: String| MeshImportError::Unreadable { format: "OBJ", reason };
     // Materials split meshes, which would change the order of vertices: [`colours`] reads them separately.
     let no_materials = |_: &std::path::Path| Err(tobj::LoadError::OpenFileFailed);
+    let load = |text: &str| {
+        let loaded = tobj::load_obj_buf(&mut Cursor::new(text), &OBJ_OPTIONS, no_materials);
+        loaded.map(|(models, _)| models).map_err(|error| unreadable(error.to_string()))
+    };
     let text = normalised(bytes);
-    let (models, _) = tobj::load_obj_buf(&mut Cursor::new(&text), &OBJ_OPTIONS, no_materials)
-        .map_err(|error| unreadable(error.to_string()))?;
+    let mut models = load(&text)?;
+    // The crate lists the coordinates of those that have some, without telling which.
+    if models.iter().any(|model| !model.mesh.texcoords.is_empty() && !all_placed(&model.mesh)) {
+        models = load(&with_coordinates_everywhere(&text))?;
+    }
     // The reader numbers vertices by their first use.
     let is_bad = |line: &str| {
         let mut words = line.split_whitespace();

@@ -327,6 +327,97 @@ fn no_line_of_an_mtl_file_panics_and_keywords_may_have_capitals() {
 }
 
 #[test]
+fn an_image_needs_texture_coordinates_of_every_face_that_has_it() {
+    let placed = CUBE.replace("f 4 3 2 1", "vt 0 0\nusemtl m\nf 4/1 3/1 2/1 1/1\nusemtl n");
+    let colours = |obj: &str, mtl: &str| {
+        let obj = format!("mtllib c.mtl\n{obj}");
+        import_colours(obj.as_bytes(), MeshFormat::Obj, &|_| Ok(mtl.as_bytes().to_vec()))
+    };
+    let mtl = "newmtl m\nmap_Kd a.png\nnewmtl n\nKd 1 0 0\nnewmtl unused\nmap_Kd b.png\n";
+    assert!(colours(&placed, mtl).is_ok(), "the other faces have no image");
+    let error = "material m: map_Kd needs texture coordinates (vt), which a face of it lacks; unwrap the mesh, or remove \
+                 map_Kd";
+    for obj in [format!("usemtl m\n{CUBE}"), placed.replace("usemtl n\n", "")] {
+        assert_eq!(colours(&obj, mtl), Err(error.to_owned()));
+    }
+    let gltf = textured_glb("\"baseColorTexture\":{\"index\":0}", "a.png");
+    let gltf = Glb { json: gltf.json.replace(",\"TEXCOORD_0\":0", ""), ..gltf };
+    assert_eq!(
+        glb_colours(&gltf),
+        Err("material 0: its image needs texture coordinates, but a mesh of it has no TEXCOORD_0; unwrap the mesh, or \
+             remove the image"
+            .to_owned())
+    );
+}
+
+#[test]
+fn texture_coordinates_are_those_of_their_corners_where_others_have_none() {
+    let corners = "vt 0.5 0.25\nvt 1 0\nvt 1 1\nvt 0 1\n";
+    for faces in ["f 4/1 3/2 2/3 1/4", "f 4/-4 3/-3 2/-2 1/-1", "vn 0 0 1\nf 4/1/1 3/2/1 2/3/1 1/4/1"] {
+        let last = format!("{}{corners}{faces}\n", CUBE.replace("f 4 3 2 1\n", ""));
+        let mesh = read_obj(&last).expect("a cube");
+        assert_eq!(mesh.uvs[0], [[0.0; 2]; 3], "{faces}");
+        assert_eq!(mesh.uvs[10], [[0.5, 0.25], [1.0, 0.0], [1.0, 1.0]], "{faces}");
+    }
+}
+
+#[test]
+fn colours_of_vertices_are_refused_unless_they_change_nothing() {
+    let coloured = |rgb: &str| {
+        let lines = CUBE.lines().map(|line| match line.starts_with('v') {
+            true => format!("{line} {rgb}\n"),
+            false => format!("{line}\n"),
+        });
+        let obj: String = lines.collect();
+        read_obj(&obj).expect("a cube");
+        import_colours(obj.as_bytes(), MeshFormat::Obj, &|_| Err(String::new()))
+    };
+    assert_eq!(coloured("1 1 1"), Ok(ImportedColours::default()));
+    assert!(coloured("1 0 0").expect_err("red").starts_with("it has colours of vertices (v x y z r g b)"));
+
+    let colours = |rgb: f32, component: &str| {
+        let mut cube = Glb::new(&read_obj(CUBE).expect("a cube"));
+        let start = cube.blob.len();
+        cube.blob.extend(std::iter::repeat_n(rgb.to_le_bytes(), 24).flatten());
+        let end = cube.blob.len();
+        cube.json = cube
+            .json
+            .replace(&format!("\"byteLength\":{start}}}]"), &format!("\"byteLength\":{end}}}]"))
+            .replace("}],\n            \"accessors\"", &format!("}},{{\"buffer\":0,\"byteOffset\":{start},\"byteLength\":96}}],\"accessors\""))
+            .replace("\"SCALAR\"}]", &format!("\"SCALAR\"}},{{\"bufferView\":2,\"componentType\":{component},\"count\":8,\"type\":\"VEC3\"}}]"))
+            .replace("\"POSITION\":0", "\"POSITION\":0,\"COLOR_0\":2");
+        import(&cube.bytes(), MeshFormat::Gltf, &METRES).expect("a cube");
+        glb_colours(&cube)
+    };
+    assert_eq!(colours(1.0, "5126"), Ok(ImportedColours::default()));
+    for (rgb, component) in [(0.5, "5126"), (1.0, "5120")] {
+        assert!(
+            colours(rgb, component).expect_err("grey").starts_with("it has colours of vertices (COLOR_0)")
+        );
+    }
+}
+
+#[test]
+fn colours_of_specular_glossiness_are_refused_without_a_base_colour() {
+    let extended = |surface: &str| {
+        let cube = textured_glb(surface, "a.png");
+        let extension = "\"materials\":[{\"extensions\":{\"KHR_materials_pbrSpecularGlossiness\":{\"diffuseFactor\":[1,0,0,1]}},";
+        let json = cube.json.replace("\"materials\":[{", extension);
+        glb_colours(&Glb { json, ..cube }).map(|colours| colours.materials[0].albedo)
+    };
+    let error = extended("").expect_err("no base colour");
+    assert!(
+        error.starts_with("material 0: its colour is that of KHR_materials_pbrSpecularGlossiness"),
+        "{error}"
+    );
+    assert_eq!(
+        extended("\"baseColorFactor\":[0.5,0,0,1]"),
+        Ok([0.5, 0.0, 0.0]),
+        "the fallback that it states"
+    );
+}
+
+#[test]
 fn more_materials_than_indices_are_refused() {
     let mtl: String = (0..=u16::MAX).map(|i| format!("newmtl m{i}\n")).collect();
     let most = mtl.strip_suffix("newmtl m65535\n").expect("the last").to_owned();
@@ -356,6 +447,11 @@ fn materials_of_gltf_files_have_embedded_images() {
              \"roughnessFactor\":0.25,\"baseColorTexture\":{\"index\":0}}}],\"textures\":[{\"source\":0}],\
              \"images\":[{\"bufferView\":2,\"mimeType\":\"image/png\"}],\"accessors\"",
         )
+        .replace("\"POSITION\":0", "\"POSITION\":0,\"TEXCOORD_0\":2")
+        .replace(
+            "\"SCALAR\"}]",
+            "\"SCALAR\"},{\"bufferView\":0,\"componentType\":5126,\"count\":8,\"type\":\"VEC2\"}]",
+        )
         .replace("\"indices\":1}", "\"indices\":1,\"material\":0}");
     let views = cube.json.find("\"bufferViews\":[").expect("views") + "\"bufferViews\":[".len();
     let end = views + cube.json[views..].find(']').expect("its end");
@@ -381,6 +477,7 @@ fn textured_glb(surface: &str, uri: &str) -> Glb {
     cube.json = cube
         .json
         .replace("\"accessors\"", &materials)
+        .replace("\"POSITION\":0", "\"POSITION\":0,\"TEXCOORD_0\":0")
         .replace("\"indices\":1}", "\"indices\":1,\"material\":0}");
     cube
 }
