@@ -2,17 +2,40 @@
 
 use std::{
     sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError},
-    time::Duration,
+    time::{Duration, Instant},
 };
 
 /// Longest wait for a message before a page looks whether the program ends.
 const WAIT: Duration = Duration::from_millis(200);
+/// Time without an open page after which the pages count as closed: one that is loaded again is back before.
+const RETURN: Duration = Duration::from_secs(3);
 
 /// Messages in their order. A new episode replaces those of the one before.
 #[derive(Debug, Default)]
 pub(crate) struct Feed {
     content: Mutex<Content>,
     changed: Condvar,
+    viewers: Mutex<Viewers>,
+}
+
+/// The pages that receive the feed.
+#[derive(Debug, Default)]
+struct Viewers {
+    count: usize,
+    /// When the last one closed.
+    left: Option<Instant>,
+}
+
+/// An open page. It counts as closed when this is dropped.
+#[derive(Debug)]
+pub(crate) struct Viewer<'a>(&'a Feed);
+
+impl Drop for Viewer<'_> {
+    fn drop(&mut self) {
+        let mut viewers = self.0.viewers();
+        viewers.count -= 1;
+        viewers.left = Some(Instant::now());
+    }
 }
 
 #[derive(Debug, Default)]
@@ -32,6 +55,27 @@ pub(crate) struct Place {
 impl Feed {
     fn lock(&self) -> MutexGuard<'_, Content> {
         self.content.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn viewers(&self) -> MutexGuard<'_, Viewers> {
+        self.viewers.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Counts a page that opens.
+    pub(crate) fn enter(&self) -> Viewer<'_> {
+        self.viewers().count += 1;
+        Viewer(self)
+    }
+
+    /// True while no page is open.
+    pub(crate) fn is_unwatched(&self) -> bool {
+        self.viewers().count == 0
+    }
+
+    /// True if no page has been open for 3 s, or ever.
+    pub(crate) fn is_abandoned(&self) -> bool {
+        let viewers = self.viewers();
+        viewers.count == 0 && viewers.left.is_none_or(|left| left.elapsed() > RETURN)
     }
 
     /// Begins an episode with a first message.
@@ -81,5 +125,20 @@ mod tests {
         feed.begin(vec![3]);
         let (third, place) = feed.next(place).unwrap();
         assert_eq!((third[0], feed.next(place)), (3, None));
+    }
+
+    #[test]
+    fn a_feed_is_abandoned_some_time_after_its_last_page_has_closed() {
+        let feed = Feed::default();
+        assert!(feed.is_abandoned(), "no page was ever open");
+        let (first, second) = (feed.enter(), feed.enter());
+        drop(first);
+        assert!(!feed.is_unwatched() && !feed.is_abandoned());
+        drop(second);
+        assert!(feed.is_unwatched() && !feed.is_abandoned(), "the page may be loaded again");
+        feed.viewers().left = Instant::now().checked_sub(RETURN + WAIT);
+        assert!(feed.is_abandoned());
+        let _third = feed.enter();
+        assert!(!feed.is_abandoned());
     }
 }

@@ -184,7 +184,7 @@ fn send_feed(request: Request, feed: &Feed) {
         .with_header(header("Sec-WebSocket-Accept", &accept));
     let stream = request.upgrade("websocket", response);
     let mut socket = WebSocket::from_raw_socket(stream, Role::Server, None);
-    let mut place = Place::default();
+    let (mut place, _viewer) = (Place::default(), feed.enter());
     while !cancel::requested() {
         let message = match feed.next(place) {
             Some((message, next)) => {

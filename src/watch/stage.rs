@@ -152,7 +152,10 @@ impl Stage {
         if is_recorded {
             return self.drive_and_record(&config, &run, job);
         }
-        let finished = self.simulate_told(&run, job)?;
+        let finished = match config.policy.name.as_str() {
+            TELEOP => self.drive(&run, job)?,
+            _ => self.simulate_told(&run, job)?,
+        };
         self.feed.push(end_message(&finished));
         Ok(())
     }
@@ -161,6 +164,22 @@ impl Stage {
     fn simulate_told(&mut self, run: &PreparedRun, job: EpisodeJob) -> Result<FinishedEpisode, RunError> {
         let mut moving: Option<Vec<MovingObject>> = None;
         run.run_episode_watched(job, &mut |episode| self.tell(episode, &mut moving))
+    }
+
+    /// Simulates an episode that is driven from the page.
+    ///
+    /// # Errors
+    /// As [`Self::simulate_told`], or the page was closed before the end.
+    fn drive(&mut self, run: &PreparedRun, job: EpisodeJob) -> Result<FinishedEpisode, RunError> {
+        let driven = self.simulate_told(run, job);
+        // A page that is loaded again may come back.
+        while driven.is_ok() && self.feed.is_unwatched() && !self.feed.is_abandoned() {
+            std::thread::sleep(POLL);
+        }
+        match !self.is_outdated && self.feed.is_abandoned() {
+            true => Err(RunError::input("the page was closed, which ended the drive; select the episode again")),
+            false => driven,
+        }
     }
 
     /// Simulates an episode that is driven from the page, and adds it to the run folder of the configuration. Whether
@@ -178,7 +197,7 @@ impl Stage {
         let served = ServedRuns::open(config, std::slice::from_ref(run))?;
         let recorder = served.recorder();
         let driven = match (recorder.selects)(&id) {
-            true => self.simulate_told(run, job).inspect_err(|_| {
+            true => self.drive(run, job).inspect_err(|_| {
                 config.notice(format!(
                     "{}: the drive of {} was not finished and is not recorded",
                     id.suite,
@@ -214,7 +233,8 @@ impl Stage {
         episode: &mut Episode,
         moving: &mut Option<Vec<MovingObject>>,
     ) -> Result<(), PolicyError> {
-        if self.look_outdated() {
+        let is_driven = self.program.selection.policy == TELEOP;
+        if self.look_outdated() || is_driven && self.feed.is_abandoned() {
             return Err(PolicyError::Interrupted);
         }
         let failed = |error: SensingError| PolicyError::Action(error.to_string());

@@ -5,6 +5,8 @@ use std::{
     io::{BufRead, BufReader, Read, Write},
     net::TcpStream,
     process::{Child, Command, Stdio},
+    thread,
+    time::{Duration, Instant},
 };
 
 use assert_cmd::cargo::cargo_bin;
@@ -35,7 +37,7 @@ impl Page {
             .arg("watch")
             .args(words.split_whitespace())
             .stdout(Stdio::piped())
-            .stderr(Stdio::null())
+            .stderr(fs::File::create(project.path("messages.txt")).expect("a file"))
             .spawn()
             .expect("started");
         let mut line = String::new();
@@ -238,6 +240,41 @@ fn a_run_is_shown_by_its_actions_and_teleoperation_is_recorded() {
     let message =
         refusal(project.softvt("record x.lua --policy driven --demos 1 --attempts 1 --out data"), "record");
     assert!(message.contains("0 of 1 demonstration after 1 attempt"), "{message}");
+}
+
+#[test]
+fn a_drive_ends_with_its_page_and_goes_on_when_it_is_loaded_again() {
+    let project = Small { task: "budget_steps = 100", expert: "arm:wait(1)", ..Small::default() }.project();
+    let page = Page::start(&project, "x.lua --out driven");
+    let mut feed = page.feed();
+    feed.until("end");
+    let start = |feed: &mut Feed| {
+        assert_eq!(page.post("/select", &json!({ "policy": "teleop" })).0, 200);
+        feed.until("open");
+        feed.until("state");
+    };
+    start(&mut feed);
+    drop(feed);
+    let messages = || fs::read_to_string(project.path("messages.txt")).unwrap();
+    let begun = Instant::now();
+    while !messages().contains("the drive of task 0 episode 0 was not finished and is not recorded") {
+        assert!(begun.elapsed() < Duration::from_secs(60), "{}", messages());
+        thread::sleep(Duration::from_millis(100));
+    }
+    assert!(!project.path("driven").exists());
+    let mut feed = page.feed();
+    let (error, _) = feed.until("error");
+    assert!(error["message"].as_str().unwrap().contains("the page was closed"), "{error}");
+
+    start(&mut feed);
+    drop(feed);
+    thread::sleep(Duration::from_secs(1));
+    assert_eq!(page.feed().until("end").1, 101);
+    let begun = Instant::now();
+    while !messages().contains("[1/") {
+        assert!(begun.elapsed() < Duration::from_secs(60), "{}", messages());
+        thread::sleep(Duration::from_millis(100));
+    }
 }
 
 #[test]
