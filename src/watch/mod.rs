@@ -8,6 +8,7 @@
 
 mod feed;
 mod geometry;
+mod menu;
 mod message;
 mod page;
 mod server;

@@ -7,7 +7,7 @@ use std::{
     io::{self, Read},
     net::{Ipv4Addr, SocketAddr, TcpListener},
     sync::{
-        Arc,
+        Arc, Mutex, PoisonError,
         mpsc::{Sender, channel},
     },
     thread,
@@ -21,6 +21,7 @@ use tungstenite::{Message as WebsocketMessage, WebSocket, handshake::derive_acce
 
 use crate::{
     feed::{Feed, Place},
+    menu::Menu,
     page::{self, PageFile},
     stage::{Program, Selection, Stage},
     teleop::{Drive, DriveInput},
@@ -43,6 +44,7 @@ struct Page {
     feed: Arc<Feed>,
     selections: Sender<Selection>,
     drive: Arc<DriveInput>,
+    menu: Arc<Mutex<Menu>>,
 }
 
 /// Who may send requests.
@@ -82,8 +84,16 @@ impl Watch {
     pub fn run(&self, program: Program) -> Result<(), WatchError> {
         let (selections, requests) = channel();
         let (feed, drive) = (Arc::new(Feed::default()), Arc::new(DriveInput::default()));
-        let page = Page { access: self.access.clone(), feed: feed.clone(), selections, drive: drive.clone() };
-        let stage = Stage { program, feed, requests, drive, files: Default::default(), is_outdated: false };
+        let menu = Arc::new(Mutex::default());
+        let page = Page {
+            access: self.access.clone(),
+            feed: feed.clone(),
+            selections,
+            drive: drive.clone(),
+            menu: menu.clone(),
+        };
+        let files = Default::default();
+        let stage = Stage { program, feed, requests, drive, menu, files, is_outdated: false, is_new: false };
         thread::scope(|scope| {
             scope.spawn(move || stage.run());
             while !cancel::requested() {
@@ -123,26 +133,27 @@ impl Page {
         }
         match (request.method(), path) {
             (Method::Get, "/feed") => send_feed(request, &self.feed),
-            (Method::Post, "/select") => match read_json(&mut request) {
-                Ok(selection) => {
-                    // The thread that simulates ends with the program only.
-                    let _ = self.selections.send(selection);
-                    respond(request, 200, "");
-                }
-                Err(problem) => respond(request, 400, &format!("{problem}\n")),
-            },
+            (Method::Post, "/select") => {
+                let selected = read_json(&mut request).and_then(|selection| self.select(selection));
+                respond_to_post(request, selected);
+            }
             (Method::Post, "/drive") => {
                 let drive = read_json(&mut request).and_then(|drive: Drive| drive.check().map(|()| drive));
-                match drive {
-                    Ok(drive) => {
-                        self.drive.set(drive);
-                        respond(request, 200, "");
-                    }
-                    Err(problem) => respond(request, 400, &format!("{problem}\n")),
-                }
+                respond_to_post(request, drive.map(|drive| self.drive.set(drive)));
             }
             _ => respond(request, 404, "there is no such page\n"),
         }
+    }
+
+    /// Selects an episode. All pages receive what is wrong with it, if anything is, as the error of its simulation.
+    ///
+    /// # Errors
+    /// The script has no such suite or task, or there is no such policy.
+    fn select(&self, selection: Selection) -> Result<(), String> {
+        let checked = self.menu.lock().unwrap_or_else(PoisonError::into_inner).check(&selection);
+        // The thread that simulates ends with the program only.
+        let _ = self.selections.send(selection);
+        checked
     }
 }
 
@@ -220,6 +231,13 @@ fn header(name: &str, value: &str) -> Header {
 fn respond(request: Request, status: u16, text: &str) {
     // The page may have closed.
     let _ = request.respond(Response::from_string(text).with_status_code(status));
+}
+
+fn respond_to_post(request: Request, done: Result<(), String>) {
+    match done {
+        Ok(()) => respond(request, 200, ""),
+        Err(problem) => respond(request, 400, &format!("{problem}\n")),
+    }
 }
 
 fn respond_with_file(request: Request, file: PageFile) {

@@ -5,7 +5,7 @@ use std::{
     collections::BTreeMap,
     panic::{self, AssertUnwindSafe},
     path::{Path, PathBuf},
-    sync::{Arc, mpsc::Receiver},
+    sync::{Arc, Mutex, PoisonError, mpsc::Receiver},
     time::{Duration, SystemTime},
 };
 
@@ -15,6 +15,7 @@ use serde_json::{Value, json};
 use crate::{
     feed::Feed,
     geometry::{MovingObject, scene_message},
+    menu::{self, Menu},
     message::Message,
     state::state_message,
     teleop::{DriveInput, TELEOP, TeleopController},
@@ -24,8 +25,8 @@ use softvt_common::{cancel, episode_id::EpisodeSplit};
 use softvt_policy::PolicyError;
 use softvt_rollout::{Episode, FinishedEpisode, SensingError};
 use softvt_runner::{
-    BuiltinPolicy, ConfiguredScript, ControllerFactory, EpisodeJob, EpisodeList, PolicyConfig, PreparedRun,
-    RunConfig, RunError, ServedRuns, SuiteRun,
+    ConfiguredScript, ControllerFactory, EpisodeJob, EpisodeList, PolicyConfig, PreparedRun, RunConfig,
+    RunError, ServedRuns, SuiteRun,
     selection::{select_episodes, select_tasks, suites_of},
 };
 
@@ -69,9 +70,13 @@ pub(crate) struct Stage {
     pub(crate) feed: Arc<Feed>,
     pub(crate) requests: Receiver<Selection>,
     pub(crate) drive: Arc<DriveInput>,
+    /// What pages may select at present.
+    pub(crate) menu: Arc<Mutex<Menu>>,
     pub(crate) files: Versions,
     /// True once the episode that is simulated was replaced by another, or one of its files was saved.
     pub(crate) is_outdated: bool,
+    /// True if the selection is one that a page has just made.
+    pub(crate) is_new: bool,
 }
 
 impl Stage {
@@ -97,7 +102,7 @@ impl Stage {
     fn look_outdated(&mut self) -> bool {
         if let Some(selection) = self.requests.try_iter().last() {
             self.program.selection = selection;
-            self.is_outdated = true;
+            (self.is_outdated, self.is_new) = (true, true);
         }
         self.is_outdated |= self.files.iter().any(|(path, version)| version_of(path) != *version);
         self.is_outdated || cancel::requested()
@@ -119,22 +124,28 @@ impl Stage {
         self.files.iter_mut().for_each(|(path, version)| *version = version_of(path));
         let name = config.file.display().to_string();
         let loaded = config.load();
-        let about = |suites: &[Suite]| opening(&name, suites, &self.program);
         let ConfiguredScript { mut config, script } = match loaded {
             Ok(loaded) => loaded,
             Err(error) => {
-                self.feed.begin(plain(about(&[])));
+                self.begin(&name, &[]);
                 return Err(error);
             }
         };
         let suites = suites_of(&script.plan);
-        self.feed.begin(plain(about(suites)));
+        self.begin(&name, suites);
         let names = script.file_hashes().into_keys().map(PathBuf::from);
         let before = std::mem::take(&mut self.files);
         let version = |path: &PathBuf| before.get(path).copied().unwrap_or_else(|| version_of(path));
         self.files = names.map(|path| (path.clone(), version(&path))).collect();
+        let is_new = std::mem::take(&mut self.is_new);
         config.policy = self.policy()?;
-        let (suite, task) = find_task(&config, suites, &self.program.selection)?;
+        let is_known = suites.iter().any(|suite| suite.name == self.program.selection.suite);
+        if !is_new && !is_known {
+            // The script was saved with another name of the suite.
+            self.program.selection.suite.clear();
+        }
+        let found = menu::find_task(suites, &self.program.selection);
+        let (suite, task) = found.map_err(|problem| config.error(problem))?;
         let job = EpisodeJob { task, episode: self.program.selection.episode };
         let is_recorded = config.policy.name == TELEOP && config.out.is_some();
         let (jobs, out, split) = match &config.out {
@@ -160,6 +171,13 @@ impl Stage {
         Ok(())
     }
 
+    /// Begins the messages of an episode, and tells what pages may select.
+    fn begin(&self, file: &str, suites: &[Suite]) {
+        let menu = Menu::new(suites, &self.program.config.policy.name);
+        *self.menu.lock().unwrap_or_else(PoisonError::into_inner) = menu;
+        self.feed.begin(plain(opening(file, suites, &self.program)));
+    }
+
     /// Simulates an episode and tells its states.
     fn simulate_told(&mut self, run: &PreparedRun, job: EpisodeJob) -> Result<FinishedEpisode, RunError> {
         let mut moving: Option<Vec<MovingObject>> = None;
@@ -177,7 +195,9 @@ impl Stage {
             std::thread::sleep(POLL);
         }
         match !self.is_outdated && self.feed.is_abandoned() {
-            true => Err(RunError::input("the page was closed, which ended the drive; select the episode again")),
+            true => {
+                Err(RunError::input("the page was closed, which ended the drive; select the episode again"))
+            }
             false => driven,
         }
     }
@@ -196,19 +216,19 @@ impl Stage {
         let id = run.episode_id(job.task, job.episode);
         let served = ServedRuns::open(config, std::slice::from_ref(run))?;
         let recorder = served.recorder();
-        let driven = match (recorder.selects)(&id) {
-            true => self.drive(run, job).inspect_err(|_| {
+        let (out, index) = (run.out.display(), id.index());
+        let driven = if (recorder.selects)(&id) {
+            self.drive(run, job).inspect_err(|_| {
                 config.notice(format!(
-                    "{}: the drive of {} was not finished and is not recorded",
-                    id.suite,
-                    id.index()
+                    "{}: the drive of {index} was not finished and is not recorded",
+                    id.suite
                 ));
-            }),
-            false => Err(RunError::input(format!(
-                "{} has {} already, or does not include it; select another episode",
-                run.out.display(),
-                id.index()
-            ))),
+            })
+        } else if run.jobs.find(index).is_some() {
+            Err(RunError::input(format!("{out} has {index} already; select another episode")))
+        } else {
+            let last = run.jobs.episodes_of(job.task.id).last().unwrap_or_default();
+            Err(RunError::input(format!("{out} has no {index}: select one of the episodes 0 to {last}")))
         };
         let recorded = driven.and_then(|finished| {
             let told = end_message(&finished);
@@ -259,6 +279,7 @@ impl Stage {
     /// The name is not that of a policy.
     fn policy(&self) -> Result<PolicyConfig, RunError> {
         let (name, given) = (&self.program.selection.policy, &self.program.config.policy);
+        menu::check_policy(&menu::policies(&given.name), name).map_err(RunError::input)?;
         match name.as_str() {
             // Whoever drives the arm sees the true state on the page.
             TELEOP => {
@@ -286,34 +307,9 @@ fn version_of(path: &PathBuf) -> Option<(u64, SystemTime)> {
     Some((metadata.len(), metadata.modified().ok()?))
 }
 
-/// The selected task, or the first one of the first suite if the script has no suite of that name.
-///
-/// # Errors
-/// The script has no suite, or the suite has no such task.
-fn find_task<'a>(
-    config: &RunConfig,
-    suites: &'a [Suite],
-    selection: &Selection,
-) -> Result<(&'a Suite, &'a Task), RunError> {
-    let first = suites.first().ok_or_else(|| {
-        config.error("it has no suite to watch; name a file that returns softvt.suite or a list of suites")
-    })?;
-    let suite = suites.iter().find(|suite| suite.name == selection.suite).unwrap_or(first);
-    let task = suite.tasks.iter().find(|task| task.id == selection.task).ok_or_else(|| {
-        let last = suite.tasks.len().saturating_sub(1);
-        config.error(format!("{} has no task {}; its tasks are 0 to {last}", suite.name, selection.task))
-    })?;
-    Ok((suite, task))
-}
-
 /// What a page needs before the scene: what can be selected, and what is.
 fn opening(file: &str, suites: &[Suite], program: &Program) -> Value {
     let given = program.config.policy.name.as_str();
-    let builtin = BuiltinPolicy::ALL.map(BuiltinPolicy::name);
-    let policies: Vec<&str> = std::iter::once(given)
-        .chain(builtin.into_iter().filter(|name| *name != given))
-        .chain([TELEOP])
-        .collect();
     let task = |task: &Task| json!({ "id": task.id, "prompt": task.prompt });
     let suite = |suite: &Suite| {
         json!({
@@ -328,7 +324,7 @@ fn opening(file: &str, suites: &[Suite], program: &Program) -> Value {
         "type": "open",
         "file": file,
         "suites": suites.iter().map(suite).collect::<Vec<_>>(),
-        "policies": policies,
+        "policies": menu::policies(given),
         "selected": {
             "suite": selected.map(|suite| suite.name.as_str()),
             "task": index,

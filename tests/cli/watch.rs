@@ -137,15 +137,17 @@ fn a_page_receives_the_scene_and_every_state_and_selects_episodes() {
         assert_eq!(feed.until("open").0["selected"]["episode"], 3);
         assert_eq!(feed.until("end").1, 7);
     }
-    assert_eq!(page.post("/select", &json!({ "task": 99 })).0, 200);
-    let (error, _) = feed.until("error");
-    assert!(
-        error["message"].as_str().unwrap().contains("one has no task 99; its tasks are 0 to 0"),
-        "{error}"
-    );
-    assert_eq!(page.post("/select", &json!({ "policy": "expret" })).0, 200);
-    let (error, _) = feed.until("error");
-    assert!(error["message"].as_str().unwrap().contains("did you mean expert?"), "{error}");
+    for (selection, expected) in [
+        (json!({ "task": 99 }), "one has no task 99; its tasks are 0 to 0"),
+        (json!({ "suite": "two" }), "unknown suite \"two\"; there are one"),
+        (json!({ "policy": "expret" }), "did you mean expert?"),
+        (json!({ "policy": "nobody" }), "random, teleop, got \"nobody\""),
+    ] {
+        let (status, text) = page.post("/select", &selection);
+        assert!(status == 400 && text.contains(expected), "{status}: {text}");
+        let (error, _) = feed.until("error");
+        assert!(error["message"].as_str().unwrap().contains(expected), "{error}");
+    }
 }
 
 #[test]
@@ -230,7 +232,17 @@ fn a_run_is_shown_by_its_actions_and_teleoperation_is_recorded() {
     // The same episode is there already.
     assert_eq!(page.post("/select", &json!({ "policy": "teleop" })).0, 200);
     let (error, _) = feed.until("error");
-    assert!(error["message"].as_str().unwrap().contains("has task 0 episode 0 already"), "{error}");
+    assert!(
+        error["message"].as_str().unwrap().contains("driven has task 0 episode 0 already; select"),
+        "{error}"
+    );
+    // The run does not include this one.
+    let episodes = run["episodes"].as_u64().unwrap();
+    assert_eq!(page.post("/select", &json!({ "policy": "teleop", "episode": episodes })).0, 200);
+    let (error, _) = feed.until("error");
+    let expected =
+        format!("driven has no task 0 episode {episodes}: select one of the episodes 0 to {}", episodes - 1);
+    assert!(error["message"].as_str().unwrap().contains(&expected), "{error}");
     // Its actions fit the episodes of demonstrations only.
     let message = project.refusal("x.lua --policy driven --out again");
     assert!(message.contains("its split is demonstration, that of this run validation"), "{message}");

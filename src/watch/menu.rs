@@ -1,0 +1,70 @@
+//! What pages may select.
+
+use std::iter;
+
+use crate::{stage::Selection, teleop::TELEOP};
+use softvt_benchmark::{Suite, Task};
+use softvt_common::text;
+use softvt_runner::BuiltinPolicy;
+
+/// The suites and the names of the policies of a program; without any, before its script is loaded.
+#[derive(Debug, Default)]
+pub(crate) struct Menu {
+    suites: Vec<Suite>,
+    policies: Vec<String>,
+}
+
+impl Menu {
+    /// The suites of a script, with the policy `given` beside the built-in ones.
+    pub(crate) fn new(suites: &[Suite], given: &str) -> Self {
+        Self { suites: suites.to_vec(), policies: policies(given) }
+    }
+
+    /// # Errors
+    /// The suite, the task or the policy of a selection is unknown.
+    pub(crate) fn check(&self, selection: &Selection) -> Result<(), String> {
+        check_policy(&self.policies, &selection.policy)?;
+        if self.suites.is_empty() { Ok(()) } else { find_task(&self.suites, selection).map(drop) }
+    }
+}
+
+/// Names of the policies that are offered: `given`, the built-in ones, and that of whoever drives the arm.
+pub(crate) fn policies(given: &str) -> Vec<String> {
+    let others = BuiltinPolicy::ALL.map(BuiltinPolicy::name).into_iter().chain([TELEOP]);
+    let others = others.filter(|name| *name != given);
+    iter::once(given).chain(others).map(str::to_owned).collect()
+}
+
+/// # Errors
+/// No policy has the name.
+pub(crate) fn check_policy(policies: &[String], name: &str) -> Result<(), String> {
+    if name.is_empty() || policies.is_empty() || policies.iter().any(|known| known == name) {
+        return Ok(());
+    }
+    let close = text::suggest(name, policies.iter().map(String::as_str));
+    let hint = close.map_or(String::new(), |close| format!("; did you mean {close}?"));
+    Err(format!("policy: expected {}, got {name:?}{hint}", policies.join(", ")))
+}
+
+/// The selected task, of the first suite if none is named.
+///
+/// # Errors
+/// There is no suite, or none of this name, or it has no such task.
+pub(crate) fn find_task<'a>(
+    suites: &'a [Suite],
+    selection: &Selection,
+) -> Result<(&'a Suite, &'a Task), String> {
+    let Selection { suite: name, task: id, .. } = selection;
+    let Some(suite) = suites.iter().find(|suite| name.is_empty() || suite.name == *name) else {
+        return Err(match suites {
+            [] => "it has no suite to watch; name a file that returns softvt.suite or a list of suites"
+                .to_owned(),
+            _ => text::unknown_name("suite", name, suites.iter().map(|suite| suite.name.as_str())),
+        });
+    };
+    let task = suite.tasks.iter().find(|task| task.id == *id).ok_or_else(|| {
+        let last = suite.tasks.len().saturating_sub(1);
+        format!("{} has no task {id}; its tasks are 0 to {last}", suite.name)
+    })?;
+    Ok((suite, task))
+}
