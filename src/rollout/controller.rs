@@ -27,6 +27,11 @@ pub trait Controller {
     fn gave_up(&self) -> Option<&str> {
         None
     }
+    /// What to say about a controller that had not ended its task at the end of the budget, such as where it was.
+    /// `None` if it had ended, or has no end. Called once, after the last control step.
+    fn unended(&mut self) -> Option<String> {
+        None
+    }
     /// Numbers that the controller notes in the record of the episode, by name.
     fn notes(&self) -> BTreeMap<String, f64> {
         BTreeMap::new()

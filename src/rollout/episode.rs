@@ -146,6 +146,8 @@ pub struct FinishedEpisode {
     pub reference: Option<ReferenceShape>,
     /// States of the episode, if requested.
     pub recording: Option<StateRecording>,
+    /// What [`Controller::unended`] says, if the budget has ended the episode. Not a part of the record.
+    pub unended: Option<String>,
 }
 
 /// An episode in progress.
@@ -330,6 +332,9 @@ impl Episode {
         controller.finish().map_err(|source| self.control_error(source))?;
         let mut finished = self.finish(controller.gave_up().map(str::to_owned));
         finished.record.stats.notes = controller.notes();
+        if finished.record.outcome == Outcome::Budget {
+            finished.unended = controller.unended();
+        }
         Ok(finished)
     }
 
@@ -642,7 +647,16 @@ impl Episode {
         let (actions, mut joint_commands) = (self.actions, self.joint_commands);
         let last = joint_commands.last().copied().unwrap_or_else(|| self.sim.robot.q(&self.sim.world));
         joint_commands.resize(actions.len(), last);
-        FinishedEpisode { record, trace: self.trace, scores, actions, joint_commands, reference, recording }
+        FinishedEpisode {
+            record,
+            trace: self.trace,
+            scores,
+            actions,
+            joint_commands,
+            reference,
+            recording,
+            unended: None,
+        }
     }
 }
 

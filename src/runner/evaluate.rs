@@ -149,9 +149,10 @@ impl<'a> RunLog<'a> {
     ) -> Result<(), RunError> {
         let (config, simulate) = (self.run.config, |position| simulate(jobs.job(position)));
         config.run_jobs(list, jobs.len(), simulate, |_, SimulatedEpisode { finished, rendered }| {
+            let unended = unended_note(&finished);
             let record = self.add(finished, &write)?;
             report_unrendered(config, record.header.id.index(), rendered);
-            Ok(line(record))
+            Ok(line(record) + &unended)
         })
     }
 
@@ -320,7 +321,7 @@ pub(crate) fn run_episodes(
         |_, finished: FinishedEpisode| {
             on_episode(&finished.record);
             config.observer.judged(finished.record.category());
-            let line = episode_line(&finished.record);
+            let line = episode_line(&finished.record) + &unended_note(&finished);
             records.push(finished.record);
             Ok(line)
         },
@@ -343,6 +344,11 @@ fn report_unrendered(config: &RunConfig, index: EpisodeIndex, rendered: Result<(
     if let Err(error) = rendered {
         config.notice(format!("warning: {index} lacks a file: {error}"));
     }
+}
+
+/// The end of the line of an episode whose controller had not ended.
+fn unended_note(finished: &FinishedEpisode) -> String {
+    finished.unended.as_ref().map_or(String::new(), |unended| format!("; {unended}"))
 }
 
 /// Formats an episode as one line of progress.

@@ -120,6 +120,10 @@ impl Controller for GripRecorder {
         self.expert.gave_up()
     }
 
+    fn unended(&mut self) -> Option<String> {
+        self.expert.unended()
+    }
+
     fn notes(&self) -> BTreeMap<String, f64> {
         self.expert.notes()
     }

@@ -43,6 +43,25 @@ fn without_give_up_there_is_no_reason() {
 }
 
 #[test]
+fn an_expert_that_has_not_ended_is_told_with_its_line() {
+    let told = |expert: &'static str| {
+        let project = Small { expert, ..Small::default() }.project();
+        let finished = project.run("x.lua").out("run").finish();
+        let record = project.lines("run/episodes.jsonl")[0].to_string();
+        assert!(!record.contains("had not ended"), "{record}");
+        let line = project.text("x.lua").lines().position(|line| line.contains("arm:wait(60)"));
+        (finished.messages, line.map_or(0, |index| index + 1))
+    };
+    let (messages, line) = told("arm:wait(0.1)\n arm:wait(60)");
+    let end = format!("2.0 s simulated; the expert had not ended: it was at x.lua:{line}\n");
+    assert!(messages.contains(&end), "{end}{messages}");
+    let (messages, _) = told("while true do pcall(arm.wait, arm, 60) end");
+    assert!(messages.contains("2.0 s simulated; the expert had not ended\n"), "{messages}");
+    let (messages, _) = told("arm:wait(0.1)");
+    assert!(!messages.contains("had not ended"), "{messages}");
+}
+
+#[test]
 fn an_object_too_wide_for_the_hand_is_given_up_before_the_approach() {
     let wide =
         Small { shape: "softvt.shape.box { size = { 0.12, 0.1, 0.04 } }:grounded()", ..Small::default() };

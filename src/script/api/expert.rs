@@ -181,7 +181,7 @@ impl Coroutine {
     }
 
     /// Raises `complaint` where the script waits; `None` if it does not wait.
-    fn raise(&self, complaint: &str) -> Option<mlua::Result<MultiValue>> {
+    pub(crate) fn raise(&self, complaint: &str) -> Option<mlua::Result<MultiValue>> {
         let waiting = self.waiting().filter(|_| self.gave_up.is_none())?;
         Some(waiting.resume(complaint).map_err(|error| placed(error, defined_line(&self.function))))
     }

@@ -8,6 +8,7 @@ use crate::{
         expert_input::{ExpertInput, SuiteInstances, TrackingErrorMonitor},
     },
     plan::ScriptInstance,
+    vm::error::ScriptError,
 };
 use softvt_policy::{Action, Observation, PolicyError, SensorStreams};
 use softvt_robot::rotation;
@@ -107,6 +108,20 @@ impl Controller for ExpertController {
 
     fn notes(&self) -> BTreeMap<String, f64> {
         self.coroutine.notes()
+    }
+
+    fn unended(&mut self) -> Option<String> {
+        let vm = &self.instance.vm;
+        let _deadline = vm.call_deadline();
+        // An error is the way to learn the line. A script that catches errors does not tell it.
+        let stopped = self.coroutine.raise("the episode has ended")?;
+        let place = stopped.err().map(|error| vm.explain(&error));
+        Some(match place {
+            Some(ScriptError { file, line: Some(line), .. }) => {
+                format!("the expert had not ended: it was at {file}:{line}")
+            }
+            _ => "the expert had not ended".to_owned(),
+        })
     }
 
     fn act(&mut self, sim: &Simulation, observation: &Observation) -> Result<Option<Action>, PolicyError> {
