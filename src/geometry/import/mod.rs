@@ -116,8 +116,8 @@ pub enum ImportedImage {
 /// plain. STL files have none.
 ///
 /// # Errors
-/// A file that the mesh file names cannot be read, a material is unknown or states what is not supported, an image has no
-/// texture coordinates, vertices have colours, or there are too many materials; the message names the file or the
+/// A file that the mesh file names cannot be read, a material is unknown or states what is not supported, an image has
+/// no texture coordinates, vertices have colours, or there are too many materials; the message names the file or the
 /// material.
 pub fn import_colours(
     bytes: &[u8],
