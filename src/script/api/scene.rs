@@ -226,7 +226,15 @@ fn position(lua: &Lua, scene: &Scene, spec: &PlacementSpec) -> mlua::Result<Vec3
                 let parts = support.asset.parts().iter().map(|part| part.name.as_str());
                 index_of(lua, &format!("scene:add: on: object {object:?}"), "part", parts, part)?;
             }
-            Ok(Vec3::new(x, y, top(support, part, x, y).unwrap_or(0.0)))
+            let height = top(support, part, x, y).ok_or_else(|| {
+                let message = format!(
+                    "scene:add: on: nothing of {on:?} is below ({}, {}) m; give `at` a point above it",
+                    format_number(x),
+                    format_number(y)
+                );
+                fail(lua, message)
+            })?;
+            Ok(Vec3::new(x, y, height))
         }
         _ => {
             let message =

@@ -314,6 +314,12 @@ fn an_object_can_stand_on_another() {
     let scene = EpisodeSetup::open(&loaded, &episode_id(0, 1), &SceneChanges::default()).unwrap().scene;
     assert!((scene.objects[1].pose_w.translation.z - 0.06).abs() < 1e-6);
     assert!(std::sync::Arc::ptr_eq(&scene.objects[0].asset, &scene.objects[1].asset));
+    let beside =
+        project(&text.replace("at = { 0.1, 0 }, on", "at = { 0.3, 0 }, on")).load("x.lua", &[]).unwrap();
+    let error =
+        EpisodeSetup::open(&beside, &episode_id(0, 1), &SceneChanges::default()).err().expect("an error");
+    let expected = "scene:add: on: nothing of \"b\" is below (0.3, 0) m; give `at` a point above it";
+    assert_eq!(error.message, expected);
 }
 
 #[test]
