@@ -5,7 +5,7 @@ use super::{
     decal::TextDecal,
     visual::{Mask, Visual},
 };
-use softvt_common::text::format_number;
+use softvt_common::text::{format_number, significant};
 use softvt_geometry::{Aabb, Vec3};
 
 impl Asset {
@@ -43,9 +43,16 @@ impl Asset {
     }
 }
 
+/// Largest period of a pattern in sizes of the shape: a larger one is most likely given in another unit.
+const MAX_PERIOD: f64 = 4.0;
+
 fn hidden_layers(visual: &Visual, bounds: &Aabb) -> Vec<String> {
     let found = visual.layers.iter().enumerate().filter_map(|(index, layer)| {
-        Some(format!("layers[{}]: {}; lengths are in metres", index + 1, misplaced(&layer.mask, bounds)?))
+        let number = index + 1;
+        if layer.opacity == 0.0 && layer.relief_m == 0.0 {
+            return Some(format!("layers[{number}]: its opacity is 0, so that it changes nothing"));
+        }
+        Some(format!("layers[{number}]: {}; lengths are in metres", misplaced(&layer.mask, bounds)?))
     });
     found.collect()
 }
@@ -75,6 +82,18 @@ fn misplaced(mask: &Mask, bounds: &Aabb) -> Option<String> {
             let [x, y, z] = decal.line.at.map(format_number);
             format!("its text, at ({x}, {y}, {z}) m, is printed beside the shape")
         }),
+        Mask::Checker { size_m: period }
+        | Mask::Stripes { pitch_m: period, .. }
+        | Mask::Specks { spacing_m: period, .. } => {
+            let size = bounds.size().max();
+            (*period > MAX_PERIOD * size).then(|| {
+                format!(
+                    "its pattern repeats every {} m, and the shape is {} m long",
+                    format_number(*period),
+                    significant(size, 3)
+                )
+            })
+        }
         _ => None,
     }
 }
@@ -149,6 +168,13 @@ mod tests {
         assert_eq!(warnings(text([0.0, 0.0, 3.0], None)).len(), 1);
         assert_eq!(warnings(text([0.5, 0.0, 0.0], Some(0.02))), [""; 0], "wrapped around the axis");
         assert_eq!(warnings(text([0.0, 0.0, 0.3], Some(0.02))).len(), 1);
+        assert_eq!(warnings(Mask::Checker { size_m: 0.01 }), [""; 0]);
+        assert_eq!(
+            warnings(Mask::Checker { size_m: 10.0 }),
+            [
+                "visuals[1].layers[1]: its pattern repeats every 10 m, and the shape is 0.08 m long; lengths are in metres"
+            ]
+        );
         let ball = Arc::new(Shape::Sphere { radius: 0.01 }.translated(Vec3::new(0.0, 0.0, 0.4)));
         assert_eq!(warnings(Mask::Inside { shape: ball, soft_m: 0.0 }).len(), 1);
     }

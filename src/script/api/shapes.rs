@@ -523,6 +523,12 @@ class! {
                 /// Part of the surface inside of this shape; the whole surface by default.
                 region: Option<LuaShape>;
             } -> ["softvt.Shape"] {
+                if let Some(region) = &region
+                    && !this.shape().loose_bounds().intersects(&region.shape().loose_bounds())
+                {
+                    let message = "shape:paint: the region lies outside of the shape, so that nothing is painted; lengths are in metres";
+                    return Err(fail(lua, message));
+                }
                 let shape = this.copy().painted(material, region.as_ref().map(LuaShape::copy));
                 this.derived(lua, shape, &Vec::from_iter(&region))?
             }

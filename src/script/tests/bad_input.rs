@@ -358,6 +358,8 @@ fn a_cut_or_a_relief_that_changes_nothing_is_refused() {
         of("ridges { height = 0.003 }"),
         "suites/x.lua:1: shape:ridges: without a count, pitch or radial_pitch it adds nothing; give one"
     );
+    let beside = format!("paint {{ material = 1, region = {ball}:translate(0.2, 0, 0) }}");
+    assert!(of(&beside).starts_with("suites/x.lua:1: shape:paint: the region lies outside of the shape"));
     let masked = "mask = { axis = 'z', from = 4, to = 10 }";
     assert_eq!(
         of(&format!("ridges {{ height = 0.003, count = 8, {masked} }}")),
