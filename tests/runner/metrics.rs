@@ -17,7 +17,6 @@ const STEPS: &str = r#"
 softvt.metric { name = "steps", of = function(_, step) return step.step end },
 softvt.metric { name = "first", over = "min", of = function(_, step) return step.time_s end },
 softvt.metric { name = "rest_m", over = "mean", of = function(scene) return scene:object("cube").centre[3] end },
-softvt.metric { name = "draw", over = "max", of = function() return math.random() end },
 softvt.metric { name = "force_n", over = "max", of = function(_, step) if step.pad_force_n[1] > 0 then return step.pad_force_n[1] end end },
 "#;
 
@@ -33,8 +32,6 @@ fn metrics_of_a_suite_are_in_records_and_summaries_and_change_nothing_else() {
     assert_eq!(metrics["steps"], Some(f64::from(record.stats.steps)));
     assert_eq!(metrics["first"], Some(0.05));
     assert!((0.0..0.2).contains(&metrics["rest_m"].unwrap()), "{metrics:?}");
-    // The same draw in each step.
-    assert!((0.0..1.0).contains(&metrics["draw"].unwrap()), "{metrics:?}");
     assert_eq!(summary.scores.metrics["steps"].mean, metrics["steps"]);
     assert_eq!(summary.scores.metrics["force_n"].n, usize::from(metrics["force_n"].is_some()));
 }
@@ -48,6 +45,9 @@ fn a_metric_that_fails_ends_the_run_and_says_where() {
         let message = project(&metric).run("x.lua").error();
         assert!(message.contains(&expected), "{message}");
     }
+    let drawn = "softvt.metric { name = 'm', of = function() return math.random() end }";
+    let message = project(drawn).run("x.lua").error();
+    assert!(message.contains("x.lua:9: math.random in a function of the state"), "{message}");
     let unknown = |body: &str, expected: &str| {
         let metric = format!("softvt.metric {{ name = 'm', of = function(_, step) {body} end }}");
         let message = project(&metric).run("x.lua").error();

@@ -43,8 +43,8 @@ impl StatePredicate for ScriptPredicate {
     }
 }
 
-/// Calls a function with the time limit of one call and the same random numbers each time. Those of the expert go on as
-/// if it had not been called.
+/// Calls a function with the time limit of one call. Random numbers, which would make its value one of the state and of
+/// chance, are an error; those of the expert go on as if it had not been called.
 fn call(
     instance: &ScriptInstance,
     function: &Function,
@@ -53,7 +53,14 @@ fn call(
     let vm = &instance.vm;
     let before = vm.random.replace(keyed_rng(&["softvt goal"]));
     let result = vm.call::<Value>(function, arguments);
+    let has_drawn = vm.random.has_drawn();
     vm.random.reseed(before);
+    if has_drawn {
+        let place = defined_at(function);
+        return Err(format!(
+            "{place}: math.random in a function of the state; its value must follow from its arguments"
+        ));
+    }
     result.map_err(|error| error.to_string())
 }
 
