@@ -66,9 +66,9 @@ softvt_common::settings! {
         kd: f64 = 100.0, "N s/m", Range::POSITIVE;
         /// Largest force per finger. The real hand holds 70 N continuously (Franka Emika, Hand data sheet); the paper's
         /// simulator has 200 N.
-        effort: f64 = 70.0, "N", Range::POSITIVE;
+        effort: f64 = 70.0, "N", Range::above(0.0, 500.0);
         /// Speed at which the target of each finger moves.
-        speed: f64 = 0.2, "m/s", Range::POSITIVE;
+        speed: f64 = 0.2, "m/s", Range::above(0.0, 2.0);
         /// Mass of each finger with its sensor.
         finger_mass: f64 = 0.1, "kg", Range::POSITIVE;
     }

@@ -130,7 +130,9 @@ impl Type {
         let checked = values.iter().enumerate().map(|(index, value)| {
             let number = number(value).filter(|number| range.contains(*number));
             number.ok_or_else(|| {
-                let message = format!("expected a number{}, got {}", range.describe(), describe(value));
+                let is_angle = matches!(self, Self::Vector(_, unit, _) if unit.starts_with("rad"));
+                let hint = if is_angle { "; math.rad converts degrees" } else { "" };
+                let message = format!("expected a number{}, got {}{hint}", range.describe(), describe(value));
                 ValidationError::new(message).inside(format!("[{}]", index + 1))
             })
         });
