@@ -2,7 +2,7 @@
 
 use super::{Asset, Body, MovingPart, SoftMaterial};
 use softvt_common::text::format_number;
-use softvt_physics::{STANDARD_GRAVITY, fem::ElasticMaterial};
+use softvt_physics::{STANDARD_GRAVITY, contact::Friction, fem::ElasticMaterial};
 
 /// Smallest plausible Young's modulus, Pa: soft gels have some hundred.
 const MIN_YOUNGS_PA: f64 = 300.0;
@@ -21,8 +21,21 @@ impl Asset {
     /// Warnings about its materials and visuals, one sentence each.
     pub fn warnings(&self) -> Vec<String> {
         let mut warnings = self.material_warnings();
+        warnings.extend(self.friction_warning());
         warnings.extend(self.visual_warnings());
         warnings
+    }
+
+    /// A warning about a slippery surface that is not: the other one of a pair has the larger coefficients.
+    fn friction_warning(&self) -> Option<String> {
+        let (own, others) = (self.friction.static_mu, Friction::STANDARD.static_mu);
+        let is_free = matches!(self.body, Body::Soft(_) | Body::Rigid { .. });
+        (is_free && !self.friction.coated && own < others).then(|| {
+            format!(
+                "friction.static_mu is {own}, and a pair of surfaces takes the larger coefficient, which is at least {others} on \
+                 tables and pads; for a slippery surface add coated = true"
+            )
+        })
     }
 
     fn material_warnings(&self) -> Vec<String> {
@@ -104,7 +117,25 @@ fn density_warning(density: f64) -> Option<String> {
 mod tests {
     use super::*;
     use softvt_geometry::{Vec3, shape::Shape};
-    use softvt_physics::contact::Friction;
+
+    #[test]
+    fn a_slippery_surface_without_a_coating_is_doubted() {
+        let of = |friction: Friction| {
+            let asset = Asset {
+                name: "soap".into(),
+                shape: Shape::Box { half: Vec3::repeat(0.02) },
+                body: Body::Rigid { density: 900.0 },
+                friction,
+                visuals: Vec::new(),
+                hints: Default::default(),
+            };
+            asset.warnings()
+        };
+        let slippery = Friction::new(0.05, 0.04);
+        assert!(of(slippery)[0].starts_with("friction.static_mu is 0.05, and a pair of surfaces"));
+        assert_eq!(of(Friction { coated: true, ..slippery }), [""; 0]);
+        assert_eq!(of(Friction::default()), [""; 0]);
+    }
 
     fn warnings(youngs_pa: f64, density: f64) -> Vec<String> {
         let material = SoftMaterial {
