@@ -1,7 +1,14 @@
 -- Loads the soft asset `name` for the script `script`; `loaded` are those loaded before.
 return function(script, name, loaded)
   if loaded[name] then error(("%s: --asset names %s twice"):format(script, name), 0) end
-  local asset = require("assets." .. name)
+  local found, asset = pcall(require, "assets." .. name)
+  if not found then
+    -- The name is from the command line: a line of this file would say nothing.
+    local request = ("require %q: "):format("assets." .. name)
+    local _, last = tostring(asset):find(request, 1, true)
+    if last then error(("%s: --asset %s: %s"):format(script, name, tostring(asset):sub(last + 1)), 0) end
+    error(asset, 0)
+  end
   if tostring(asset.body) ~= "softvt.soft" then
     error(("%s: %s is not soft: only a body of softvt.soft deforms"):format(script, name), 0)
   end

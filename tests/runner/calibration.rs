@@ -79,6 +79,18 @@ fn a_strain_out_of_range_is_refused() {
 }
 
 #[test]
+fn an_asset_that_is_too_thin_is_refused_at_its_own_line() {
+    let project = brick("collapse_strain = 0.12");
+    let flat = project.text("assets/brick.lua").replace("0.03, 0.024 } }:round(0.003)", "0.03, 0.004 } }");
+    project.write("assets/brick.lua", flat.as_bytes());
+    let message = refusal(&quick(&project, "run"));
+    assert!(
+        message.starts_with("assets/brick.lua:3: world:soft: asset brick: it is 4 mm thick"),
+        "{message}"
+    );
+}
+
+#[test]
 fn assets_without_a_window_are_told_with_the_files_of_all_assets() {
     let project = brick("collapse_strain = 0.002");
     let sound = project.text("assets/brick.lua").replace("0.002", "0.12").replace("'brick'", "'sound'");
@@ -194,6 +206,7 @@ fn a_calibration_refuses_what_does_nothing_and_what_would_replace_the_limits() {
         ("--kappa=0.3", "--kappa 0.3: give an output folder"),
         ("--asset=brick,brick", "--asset names brick twice"),
         ("--asset=table", "table is not soft"),
+        ("--asset=bricks", "calibrate: --asset bricks: no assets/bricks.lua in "),
     ] {
         let asset = if words.contains("--asset") { "" } else { "--asset=brick" };
         let message = refusal(&project.run(CALIBRATE.0).options(asset).options(words));

@@ -127,6 +127,11 @@ fn check_ridges(lua: &Lua, height: f64, pitch: f64) -> mlua::Result<()> {
 }
 
 impl LuaShape {
+    /// Line of the script that made it.
+    pub(crate) fn made_at(&self) -> Option<&SourceLine> {
+        self.0.use_mark.made_at.as_ref()
+    }
+
     /// The visual that its mesh files state; `None` without one.
     ///
     /// # Errors

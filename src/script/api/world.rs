@@ -13,7 +13,7 @@ use super::{assets::STRAIN, experiment_input, shapes::LuaShape};
 use crate::{
     schema::{Constructed, Range, Type, class, functions, output, record},
     vm::{
-        error::{app_data, fail},
+        error::{app_data, fail, fail_at, library_is_running},
         memory_budget::{Reservation, reserve_in_world},
         value::finite,
         watchdog::Clock,
@@ -22,7 +22,7 @@ use crate::{
 use softvt_common::cancel;
 use softvt_common::parallel::lock;
 use softvt_evaluation::deformation::{Deformation, ReferenceShape};
-use softvt_geometry::{Pose, Quat, Vec3, shape::Shape};
+use softvt_geometry::{Pose, Quat, Vec3};
 use softvt_physics::{
     BodyId, ColliderId, KinematicId, PhysicsParams, SoftId, World,
     contact::{Collider, Friction, SurfaceStiffness},
@@ -209,12 +209,20 @@ impl LuaWorld {
         &self,
         lua: &Lua,
         name: &str,
-        shape: &Shape,
+        shape: &LuaShape,
         body: &SoftMaterial,
         friction: Friction,
         pose: Pose,
     ) -> mlua::Result<LuaBody> {
-        let wrong = |error: &dyn fmt::Display| fail(lua, format!("world:soft: {error}"));
+        let wrong = |error: &dyn fmt::Display| {
+            let message = format!("world:soft: {error}");
+            // A standard script that presses an asset has no fault: the file of the asset is named.
+            match shape.made_at().filter(|_| library_is_running(lua)) {
+                Some(line) => fail_at(lua, Some(line.clone()), message),
+                None => fail(lua, message),
+            }
+        };
+        let shape = shape.shape();
         let mut inner = lock(&self.0);
         let model = {
             let _pause = inner.clock.pause();
@@ -308,7 +316,7 @@ class! {
                 /// Orientation; none by default.
                 axis_angle: Option<[f64; 3]> = AXIS_ANGLE;
             } -> ["softvt.Body"] {
-                this.add_soft(lua, &name, shape.shape(), &body, friction, pose(position, axis_angle))?
+                this.add_soft(lua, &name, &shape, &body, friction, pose(position, axis_angle))?
             }
             /// Adds a solid that solid:move_to moves.
             fn kinematic(lua, this, spec: WorldSolidSpec) -> ["softvt.Solid"] { this.add_solid(lua, &spec, true)? }

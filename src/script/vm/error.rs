@@ -217,12 +217,19 @@ pub(crate) fn author_line(lua: &Lua) -> Option<SourceLine> {
 
 /// Line of the innermost function on the stack that is the author's own.
 fn own_line(lua: &Lua) -> Option<SourceLine> {
+    running_lines(lua).find(|line| !is_library(lua, &line.file))
+}
+
+/// True if the innermost script function on the stack is of the embedded library below `scripts/`.
+pub(crate) fn library_is_running(lua: &Lua) -> bool {
+    current_line(lua).is_some_and(|line| is_library(lua, &line.file))
+}
+
+/// True for a file of the embedded library below `scripts/`, other than the main file.
+fn is_library(lua: &Lua, file: &str) -> bool {
     let main = app_data::<MainFile>(lua).map(|main| main.0).unwrap_or_default();
-    let is_library = |file: &str| {
-        let path = file.rfind("scripts/").map(|at| &file[at..]);
-        file != main && path.is_some_and(|path| embedded(path).is_some())
-    };
-    running_lines(lua).find(|line| !is_library(&line.file))
+    let path = file.rfind("scripts/").map(|at| &file[at..]);
+    file != main && path.is_some_and(|path| embedded(path).is_some())
 }
 
 /// Lines of the script functions on the stack, from the innermost.
