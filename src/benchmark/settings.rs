@@ -33,6 +33,8 @@ pub enum SettingsError {
     UnknownField { path: String, group: String, known: Vec<String> },
     #[error("no setting {path:?}; {parent} is a single value")]
     NotAGroup { path: String, parent: String },
+    #[error("no setting {path:?} with the model {model:?}; select its model by {group} too: {models}")]
+    OtherModel { path: String, model: String, group: String, models: String },
     #[error("{path} is a group of settings; its fields are {}, as in {path}.{}=…", fields.join(", "), fields[0])]
     Group { path: String, fields: Vec<String> },
     #[error("{path}: expected {expected}, got {value:?}")]
@@ -89,17 +91,13 @@ impl Settings {
         [physics, robot, criteria, tactile, Setting::list::<CameraSettings>("cameras")].concat()
     }
 
-    /// The same with the fields at dotted paths set, such as `robot.pads.static_mu` to `0`. Ranges that depend on each
-    /// other are checked once all fields are set.
+    /// The same with the fields at dotted paths set, such as `robot.pads.static_mu` to `0`, in this order, or in one in
+    /// which they can be set. Ranges that depend on each other are checked once all fields are set.
     ///
     /// # Errors
     /// A field does not exist, or its value has a wrong type or is out of range.
     pub fn with_all(&self, fields: &[(String, String)]) -> Result<Self, SettingsError> {
-        let mut changed = self.clone();
-        for (path, value) in fields {
-            changed = changed.replaced(path, value)?;
-        }
-        changed.validated()
+        self.with_unchecked(fields)?.validated()
     }
 
     /// The physics alone with the fields at dotted paths set, for simulations without the control steps of the
@@ -108,36 +106,46 @@ impl Settings {
     /// # Errors
     /// As [`Settings::with_all`].
     pub fn physics_with(&self, fields: &[(String, String)]) -> Result<PhysicsParams, SettingsError> {
-        let mut changed = self.clone();
-        for (path, value) in fields {
-            changed = changed.replaced(path, value)?;
-        }
+        let changed = self.with_unchecked(fields)?;
         changed.physics.check("physics")?;
         Ok(changed.physics)
     }
 
-    /// Checks that the fields at dotted paths exist and can take their values, whatever the values of others.
+    /// Checks that the fields at dotted paths exist and can take their values, whatever the ranges of others.
     ///
     /// # Errors
     /// A field does not exist, or its value has a wrong type.
     pub fn check_fields(&self, fields: &[(String, String)]) -> Result<(), SettingsError> {
-        fields.iter().try_for_each(|(path, value)| self.replaced(path, value).map(|_| ()))
+        self.with_unchecked(fields).map(|_| ())
+    }
+
+    fn with_unchecked(&self, fields: &[(String, String)]) -> Result<Self, SettingsError> {
+        let set_all = |fields: &[(String, String)]| {
+            fields.iter().try_fold(self.clone(), |changed, (path, value)| changed.replaced(path, value))
+        };
+        set_all(fields).or_else(|error| {
+            // Models before their constants.
+            let mut sorted = fields.to_vec();
+            sorted.sort_by_key(|(path, _)| (!path.ends_with(MODEL), path.split('.').count()));
+            set_all(&sorted).map_err(|_| error)
+        })
     }
 
     fn replaced(&self, path: &str, value: &str) -> Result<Self, SettingsError> {
         let refused = |e: serde_json::Error| refusal(path, value, &e.to_string());
         let mut tree = serde_json::to_value(self).map_err(refused)?;
+        // Another model does not keep the constants of the present one.
+        let group_of_model =
+            path.strip_suffix(MODEL).and_then(|group| group.strip_suffix('.')).filter(|group| {
+                let present = tree.pointer(&format!("/{}/{MODEL}", group.replace('.', "/")));
+                present.is_some_and(|model| model != value.trim_matches('"'))
+            });
         let mut at = &mut tree;
         let mut parents = Vec::new();
-        for key in path.split('.') {
+        for key in group_of_model.unwrap_or(path).split('.') {
             let known = fields(at);
-            at = at.get_mut(key).ok_or_else(|| {
-                let group = parents.join(".");
-                match known.is_empty() {
-                    true => SettingsError::NotAGroup { path: path.to_owned(), parent: group },
-                    false => SettingsError::UnknownField { path: path.to_owned(), group, known },
-                }
-            })?;
+            let model = at.get(MODEL).and_then(Value::as_str).map(str::to_owned);
+            at = at.get_mut(key).ok_or_else(|| unknown(path, parents.join("."), model, known))?;
             parents.push(key);
         }
         let parsed = serde_json::from_str::<Value>(value);
@@ -145,6 +153,9 @@ impl Settings {
             (Value::Object(_), Ok(group @ Value::Object(_))) => group,
             // A setting with several models can be given by the name of a model alone.
             (Value::Object(known), Err(_)) if known.contains_key(MODEL) => json!({ MODEL: value }),
+            (Value::Object(known), Ok(Value::String(model))) if known.contains_key(MODEL) => {
+                json!({ MODEL: model })
+            }
             (Value::Object(_), _) => {
                 return Err(SettingsError::Group { path: path.to_owned(), fields: fields(at) });
             }
@@ -239,6 +250,21 @@ const ROUNDING: f64 = 5e-4;
 
 /// Names the kind of a setting that can be of several: `tactile.optics.model`.
 pub const MODEL: &str = "model";
+
+/// Error of a path below `group` that does not exist with the present `model` of the group, if it has several.
+fn unknown(path: &str, group: String, model: Option<String>, known: Vec<String>) -> SettingsError {
+    let path = path.to_owned();
+    let list = Settings::list();
+    let values_of =
+        |path: &str| list.iter().find(|setting| setting.path == path).map(|setting| &setting.values);
+    match (model, values_of(&path), values_of(&group)) {
+        (Some(model), Some(_), Some(models)) => {
+            SettingsError::OtherModel { path, model, models: models.clone(), group }
+        }
+        _ if known.is_empty() => SettingsError::NotAGroup { path, parent: group },
+        _ => SettingsError::UnknownField { path, group, known },
+    }
+}
 
 /// A whole number, which scripts may write as 2.0.
 fn whole_number(path: &str, value: &Value) -> Result<Value, SettingsError> {
@@ -407,10 +433,48 @@ mod tests {
                 )
             );
         }
+        let fots = settings.with("tactile.markers", r#"{"model":"fots","scale":15.77}"#).expect("a model");
+        assert_eq!(
+            fots.with("tactile.markers.model", "elastic"),
+            Ok(settings.clone()),
+            "without its constants"
+        );
+        assert_eq!(fots.with("tactile.markers.model", "fots"), Ok(fots.clone()));
         let unknown = settings.with("tactile.optics", "tracim").expect_err("no such model");
         assert_eq!(
             unknown.to_string(),
             "tactile.optics: unknown variant `tracim`, expected `polynomial` or `taxim`"
         );
+    }
+
+    #[test]
+    fn constants_of_a_model_are_set_with_it_in_any_order() {
+        let settings = Settings::default();
+        let constant = ("tactile.markers.dilate".to_owned(), "0.1".to_owned());
+        for path in ["tactile.markers", "tactile.markers.model"] {
+            let model = (path.to_owned(), "fots".to_owned());
+            let fields = [model.clone(), constant.clone()];
+            let set = settings.with_all(&fields).expect("the model first");
+            assert_eq!(
+                set.tactile.markers,
+                MarkerModel::Fots(FotsSpec { dilate: 0.1, ..FotsSpec::default() })
+            );
+            assert_eq!(settings.with_all(&[constant.clone(), model]), Ok(set));
+            settings.check_fields(&fields).expect("as a condition");
+        }
+        assert_eq!(
+            settings.with_all(&[constant]).expect_err("elastic").to_string(),
+            "no setting \"tactile.markers.dilate\" with the model \"elastic\"; select its model by tactile.markers too: \
+             elastic, or fots with the constants below"
+        );
+        for (path, value) in [
+            ("tactile.markers", r#"{"model":"elastic","dilate":1}"#),
+            ("tactile.optics", r#"{"model":"polynomial","dilate":1}"#),
+        ] {
+            assert_eq!(
+                settings.with(path, value).expect_err("no such field").to_string(),
+                format!("{path}: unknown field `dilate`, there are no fields")
+            );
+        }
     }
 }

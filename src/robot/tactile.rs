@@ -187,7 +187,7 @@ impl SettingField for OpticsModel {
 
 impl SettingField for MarkerModel {
     fn describe(&self, declaration: &SettingDeclaration<'_>, list: &mut Vec<Setting>) {
-        let values = "elastic, or fots, whose constants below are set after it".to_owned();
+        let values = "elastic, or fots with the constants below".to_owned();
         list.push(declaration.setting("elastic", values));
         FotsSpec::default().describe(declaration, list);
     }
