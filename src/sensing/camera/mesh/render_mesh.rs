@@ -151,7 +151,7 @@ impl RenderMesh {
 
     /// Builds the level that casts shadows, which every image needs, and leaves finer ones for later.
     fn with_lazy_levels(surface: ShapeSurface) -> Result<Self, CameraError> {
-        let cells = surface.cells()?;
+        let cells = surface.cells();
         let surface = Arc::new(surface);
         let level = |(index, cells): (usize, f64)| {
             let surface = surface.clone();
@@ -333,18 +333,22 @@ impl ShapeSurface {
 
     /// Cells along the longest edge of the shape, per level of detail. A shape with walls that the finest level would
     /// miss has one level with cells that are as small.
-    fn cells(&self) -> Result<Vec<f64>, CameraError> {
+    fn cells(&self) -> Vec<f64> {
         let shape = &self.material.shape;
         // A mesh has its own triangles at every level.
         if matches!(shape, Shape::Mesh(_)) {
-            return Ok(vec![CELLS[0]]);
+            return vec![CELLS[0]];
         }
         let size = shape.bounds().size().max();
-        let wall = self.cache.get("wall", &self.key, || {
+        let key = self.cache.key("wall", &self.key);
+        let wall = key.as_ref().and_then(|key| self.cache.read(key)).unwrap_or_else(|| {
             let is_meshed = self.primitives(size / CELLS[0]).is_none();
-            Ok(is_meshed.then(|| wall_below(shape, size / CELLS[0])).flatten())
-        })?;
-        Ok(wall.map_or(CELLS.to_vec(), |wall| vec![size / wall]))
+            let wall = is_meshed.then(|| wall_below(shape, size / CELLS[0])).flatten();
+            // Kept however fast it was found: for many shapes that takes about the time from which on values are kept.
+            key.iter().for_each(|key| self.cache.write(key, &wall));
+            wall
+        });
+        wall.map_or(CELLS.to_vec(), |wall| vec![size / wall])
     }
 
     fn triangulate(&self, cell: f64) -> Mesh {
