@@ -189,16 +189,7 @@ impl<'a> SuiteRecording<'a> {
                 let line = |record: &EpisodeRecord| attempt_line(record, self.options.keep);
                 log.run_jobs(&list, &jobs, record, write_actions, line)?;
             }
-            for task in &self.tasks {
-                let kept = kept(&log.records, task.id, self.options.keep);
-                let is_complete = match self.demos {
-                    Some(required) => kept.len() == required as usize,
-                    None => self.due(&log.records, task.id).is_empty(),
-                };
-                if !kept.is_empty() && is_complete {
-                    self.merge_task(task.id, &kept)?;
-                }
-            }
+            self.merge_tasks(&log.records)?;
             if jobs.is_empty() || cancel::requested() {
                 return Ok(());
             }
@@ -270,6 +261,25 @@ impl<'a> SuiteRecording<'a> {
     /// Paths of the files of a task.
     fn paths(&self, task: usize) -> TaskPaths {
         TaskPaths { root: self.options.out.clone(), suite: self.folder_name.clone(), task }
+    }
+
+    /// Merges the demonstrations of the tasks that have them all, tasks at the same time.
+    fn merge_tasks(&self, records: &[EpisodeRecord]) -> Result<(), RunError> {
+        let complete = |task: &&Task| {
+            let kept = kept(records, task.id, self.options.keep);
+            let is_complete = match self.demos {
+                Some(required) => kept.len() == required as usize,
+                None => self.due(records, task.id).is_empty(),
+            };
+            (!kept.is_empty() && is_complete).then_some((task.id, kept))
+        };
+        let complete: Vec<_> = self.tasks.iter().filter_map(complete).collect();
+        let merge = |job: usize| {
+            let (task, kept) = &complete[job];
+            self.merge_task(*task, kept)
+        };
+        // Also after a request to stop: what is complete stays.
+        parallel::run(complete.len(), self.run.config.thread_count(), || false, merge, |_, ()| Ok(()))
     }
 
     /// Merges the demonstrations of a task into one file, unless it exists, and removes their parts.
