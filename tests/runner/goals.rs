@@ -140,15 +140,20 @@ fn a_function_of_a_goal_that_fails_ends_the_episode_and_says_where() {
     assert_snapshot!(at_start("error 'no'"), @"x.lua: task 0, episode 0: x.lua:11: no");
     assert_snapshot!(at_start("return 1"), @r#"x.lua: task 0, episode 0: x.lua:11: the predicate "x" returned 1; return true or false"#);
     assert_snapshot!(at_start("return scene:object('blck').yaw > 0"), @r#"x.lua: task 0, episode 0: x.lua:11: scene: unknown object "blck"; did you mean "block"?"#);
-    let project = project(&predicate(
-        "assert(scene:object('block').centre[1] < 1 and scene:object('block').joint == nil) return math.random() < 2",
-    ));
-    assert!(project.run("x.lua").record().verdict.goal, "random numbers are those of the goal");
+    let drawn = at_start("return math.random() < 2");
+    assert!(
+        drawn.ends_with(
+            "x.lua:11: math.random in a function of the state; its value must follow from its arguments"
+        ),
+        "{drawn}"
+    );
+    let read = "return scene:object('block').centre[1] < 1 and scene:object('block').joint == nil";
+    assert!(project(&predicate(read)).run("x.lua").record().verdict.goal);
     let late = format!(
         "(function() local calls = 0 return {} end)()",
         predicate("calls = calls + 1 if calls > 3 then error 'late' end return false")
     );
-    let record = self::project(&late).run("x.lua").record();
+    let record = project(&late).run("x.lua").record();
     let Outcome::Error { message } = record.outcome else { panic!("{:?}", record.outcome) };
     assert!(message.ends_with("x.lua:11: late"), "{message}");
 }
