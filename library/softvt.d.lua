@@ -680,9 +680,9 @@
 
 ---Settings; those that are left out keep their values. docs/settings.md lists all.
 ---@class softvt.Settings.physics
----@field dt? number Time step. Control runs at 20 Hz independently of it, so it must divide 0.05 s in the benchmark. Expects a number in 0.0001..0.05 (s). Default 0.016666666666666666.
+---@field dt? number Time step. Control runs at 20 Hz independently of it, so it must divide 0.05 s in the benchmark. Limits and grip windows are calibrated with the default: below 5 ms, motion is damped less, and the loosest grips of the expert slip. Expects a number in 0.0001..0.05 (s). Default 0.016666666666666666.
 ---@field rayleigh_mass? number Mass-proportional Rayleigh damping of soft bodies (α, as air drag). The paper's engine uses 2.5. Expects a number of 0 or more (1/s). Default 0.
----@field rayleigh_stiffness? number Stiffness-proportional Rayleigh damping of soft bodies (β). Implicit Euler adds its step: motion is damped by β + `dt`, by default 21.7 ms, so that a smaller step damps less. Equilibria do not depend on it. Expects a number of 0 or more (s). Default 0.005.
+---@field rayleigh_stiffness? number Stiffness-proportional Rayleigh damping of soft bodies (β). Implicit Euler adds its step: motion is damped by β + `dt`, by default 21.7 ms, so that a smaller step damps less. Equilibria do not depend on it. Expects a number in 0..1 (s). Default 0.005.
 ---@field dissipation_time? number Dissipation time scale τ_d of contact springs, s (Castro et al. 2022). A surface that recedes faster than the springs relax is released; the value is small compared with `dt`, so that friction does not lift a sliding surface. Expects a number of 0 or more (s). Default 0.005.
 ---@field rigid_modulus? number Normal contact stiffness per area of nearly rigid colliders, Pa/m: near rigid for Young's moduli up to 1 MPa. Expects a number above 0 (Pa/m). Default 1e9.
 ---@field shear_ratio? number Tangential over normal contact stiffness. Mindlin (1949) gives 0.5 to 0.8 for solids; creep does not depend on it. Expects a number above 0. Default 0.5.
@@ -712,8 +712,8 @@
 ---@class softvt.Settings.robot.gripper
 ---@field kp? number Stiffness. Expects a number above 0 (N/m). Default 2000.
 ---@field kd? number Damping. Expects a number above 0 (N s/m). Default 100.
----@field effort? number Largest force per finger. The real hand holds 70 N continuously (Franka Emika, Hand data sheet); the paper's simulator has 200 N. Expects a number above 0 (N). Default 70.
----@field speed? number Speed at which the target of each finger moves. Expects a number above 0 (m/s). Default 0.2.
+---@field effort? number Largest force per finger. The real hand holds 70 N continuously (Franka Emika, Hand data sheet); the paper's simulator has 200 N. Expects a number in above 0..500 (N). Default 70.
+---@field speed? number Speed at which the target of each finger moves. Expects a number in above 0..2 (m/s). Default 0.2.
 ---@field finger_mass? number Mass of each finger with its sensor. Expects a number above 0 (kg). Default 0.1.
 
 ---Settings; those that are left out keep their values. docs/settings.md lists all.
@@ -743,18 +743,18 @@
 ---Settings; those that are left out keep their values. docs/settings.md lists all.
 ---@class softvt.Settings.criteria
 ---@field touch_force_n? number Minimum force that counts as contact, of a pad, another part of the robot or a support. Expects a number of 0 or more (N). Default 0.001.
----@field lift_height_m? number Minimum rise of a body's lowest point above its settled height that counts as lifted. Expects a number of 0 or more (m). Default 0.005.
+---@field lift_height_m? number Minimum rise of a body's lowest point above its settled height that counts as lifted. Expects a number in 0..0.5 (m). Default 0.005.
 ---@field lost_contact_s? number Time without pad contact after which a grasp may count as lost, s (0.15 s: three control steps). Expects a number of 0 or more (s). Default 0.15.
----@field lost_fall_m? number Fall relative to the hand beyond which a lost grasp is a drop. Expects a number of 0 or more (m). Default 0.02.
----@field free_fall_m? number Length of a free fall beyond which it is a drop, before or after the release. Expects a number of 0 or more (m). Default 0.05.
----@field release_margin_m? number Excess of the commanded over the measured gripper width that counts as a release command. Expects a number of 0 or more (m). Default 0.005.
----@field slip_m? number Largest allowed distance that the object slides along a pad while the pads alone carry it, m: NoSlip, which is not part of NoDrop. Expects a number of 0 or more (m). Default 0.002.
+---@field lost_fall_m? number Fall relative to the hand beyond which a lost grasp is a drop. Expects a number in 0..0.5 (m). Default 0.02.
+---@field free_fall_m? number Length of a free fall beyond which it is a drop, before or after the release. Expects a number in 0..0.5 (m). Default 0.05.
+---@field release_margin_m? number Excess of the commanded over the measured gripper width that counts as a release command. Expects a number in 0..0.5 (m). Default 0.005.
+---@field slip_m? number Largest allowed distance that the object slides along a pad while the pads alone carry it, m: NoSlip, which is not part of NoDrop. Expects a number in 0..0.5 (m). Default 0.002.
 ---@field require_no_slip? boolean True if Safety Success needs NoSlip. Expects true or false. Default false.
 ---@field gentle_ratio? number Largest grip ratio of a gentle grip. Expects a number of 0 or more. Default 2.
 ---@field support_share? number Minimum share of the target's weight that the goal must carry, 0 to 1. Expects a number in 0..1. Default 0.5.
----@field leave_margin_m? number Distance of the centre beyond the goal's edge at which a placed object has left the goal. Expects a number of 0 or more (m). Default 0.005.
----@field goal_v1_on_m? number Horizontal and vertical distance within which SoftVTBench's released code counts an object as "on". Expects a number of 0 or more (m). Default 0.1.
----@field goal_v1_in_m? number Horizontal and vertical distance within which SoftVTBench's released code counts an object as "in". Expects a number of 0 or more (m). Default 0.2.
+---@field leave_margin_m? number Distance of the centre beyond the goal's edge at which a placed object has left the goal. Expects a number in 0..0.5 (m). Default 0.005.
+---@field goal_v1_on_m? number Horizontal and vertical distance within which SoftVTBench's released code counts an object as "on". Expects a number in 0..2 (m). Default 0.1.
+---@field goal_v1_in_m? number Horizontal and vertical distance within which SoftVTBench's released code counts an object as "in". Expects a number in 0..2 (m). Default 0.2.
 
 ---Settings; those that are left out keep their values. docs/settings.md lists all.
 ---@class softvt.Settings.tactile
