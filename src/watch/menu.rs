@@ -1,4 +1,4 @@
-//! What pages may select.
+//! Suites, tasks and policies that pages may select.
 
 use std::iter;
 

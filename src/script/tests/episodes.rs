@@ -7,15 +7,10 @@ use crate::{
     check_shift,
 };
 use softvt_benchmark::{Goal, Plan, ShiftValue};
-use softvt_common::episode_id::{EpisodeId, EpisodeSplit};
 use softvt_geometry::{Pose, Vec3, shape::Shape};
 use softvt_robot::IkSpec;
 use softvt_rollout::Controller;
 use softvt_scene::{Asset, Body};
-
-fn episode_id(episode: u32, base_seed: u64) -> EpisodeId {
-    EpisodeId { suite: "test".into(), task: 0, episode, base_seed, split: EpisodeSplit::Validation }
-}
 
 fn project(rest: &str) -> Project {
     Project::new(&[("x.lua", &format!("{SUITE}{rest}"))])

@@ -1,6 +1,5 @@
 use super::*;
 use crate::{EpisodeSetup, SceneChanges};
-use softvt_common::episode_id::{EpisodeId, EpisodeSplit};
 use softvt_geometry::{Pose, Vec3};
 use softvt_physics::joints;
 use softvt_rollout::{AssetCache, Simulation};
@@ -32,15 +31,8 @@ fn suite(chest: &str, place: &str) -> String {
 fn open(text: &str) -> Result<Scene, String> {
     let project = Project::new(&[("x.lua", text)]);
     let loaded = project.load("x.lua", &[]).map_err(|e| e.message)?;
-    let id = EpisodeId {
-        suite: "test".into(),
-        task: 0,
-        episode: 0,
-        base_seed: 1,
-        split: EpisodeSplit::Validation,
-    };
     let folder = format!("{}/", project.path("").display()).replace("//", "/");
-    EpisodeSetup::open(&loaded, &id, &SceneChanges::default())
+    EpisodeSetup::open(&loaded, &episode_id(0, 1), &SceneChanges::default())
         .map(|e| e.scene)
         .map_err(|e| e.to_string().replace(&folder, ""))
 }

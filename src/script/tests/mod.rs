@@ -15,6 +15,12 @@ mod visuals;
 use std::{fs, path::PathBuf, sync::Arc, time::Duration};
 
 use super::{LoadedScript, ScriptError, VmLimits, load_with};
+use softvt_common::episode_id::{EpisodeId, EpisodeSplit};
+
+/// An episode of the first task of the suite "test".
+pub(super) fn episode_id(episode: u32, base_seed: u64) -> EpisodeId {
+    EpisodeId { suite: "test".into(), task: 0, episode, base_seed, split: EpisodeSplit::Validation }
+}
 
 /// A temporary project folder.
 pub(super) struct Project(tempfile::TempDir);
