@@ -45,7 +45,7 @@ fn thin_walls(object: &Object, description: &str, min: f64) -> SceneBuildError {
 }
 
 /// Tolerated initial overlap, m. Contact forces resolve it while the objects settle.
-const MAX_OVERLAP: f64 = 1e-3;
+pub const MAX_OVERLAP: f64 = 1e-3;
 
 /// Adds all objects of a scene to the world, in the order of the scene, each followed by its parts.
 pub(super) fn add_all(
@@ -72,7 +72,10 @@ pub(super) fn check_overlap(world: &mut World, scene: &Scene) -> Result<(), Scen
         let whole = name.split('.').next().unwrap_or(name);
         scene.objects.iter().position(|object| object.name == whole)
     };
-    let [mut first, mut second] = [0, 1].map(|i| (index(&deepest.names[i]), deepest.names[i].clone()));
+    let [mut first, mut second] = deepest.bodies.map(|body| {
+        let name = world.partner_name(body);
+        (index(name), name.to_owned())
+    });
     if first.0 < second.0 {
         // The error names the object that was placed last first.
         std::mem::swap(&mut first, &mut second);

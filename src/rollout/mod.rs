@@ -94,6 +94,7 @@ mod soft_model;
 mod trace;
 
 pub use asset_cache::AssetCache;
+pub use build::MAX_OVERLAP;
 pub use build_error::SceneBuildError;
 pub use controller::{ChunkedPolicy, Controller};
 pub use episode::{Episode, EpisodeSpec, FinishedEpisode, checksum, target_asset};

@@ -73,3 +73,48 @@ end"#;
     let message = problem(&format!("grid = {{ a = {{ 1 }} }}, run = {run}"));
     assert!(message.contains("world:step: the world is invalid: "), "{message}");
 }
+
+#[test]
+fn bodies_of_a_world_that_overlap_or_jump_into_each_other_are_refused() {
+    let world = |actions: &str| {
+        let run = format!(
+            r#"function()
+  local world = softvt.world {{}}
+  local soft = softvt.soft {{ youngs_pa = 2e4, poisson = 0.4, density = 300 }}
+  local box = softvt.shape.box {{ size = {{ 0.04, 0.04, 0.04 }} }}
+  local function body(name, x) world:soft {{ name = name, shape = box, position = {{ x, 0, 0.02 }}, body = soft }} end
+  local function solid(name, x) return world:kinematic {{ name = name, shape = box, position = {{ x, 0, 0.02 }} }} end
+  {actions}
+  return {{ a = 1 }}
+end"#
+        );
+        experiment(&format!("grid = {{ a = {{ 1 }} }}, run = {run}"))
+    };
+    let refused = |actions: &str| {
+        let project = world(actions);
+        let (_, outcome) = project.run("x.lua").experiment();
+        project.message(outcome)
+    };
+    let overlap = refused("body('cube', 0) body('other', 0.03)");
+    assert!(
+        overlap.contains("\"cube\" and \"other\" overlap by 10 mm at the start; move them apart"),
+        "{overlap}"
+    );
+    let overlap = refused("body('cube', 0)\n  world:step()\n  solid('pad', 0.03)");
+    assert!(
+        overlap.contains("x.lua:11: ") && overlap.contains("\"cube\" and \"pad\" overlap by"),
+        "{overlap}"
+    );
+    for to in [0.0, -0.2] {
+        let jump = refused(&format!(
+            "body('cube', 0) solid('pad', 0.1):move_to {{ {to}, 0, 0.02 }}\n  world:step()"
+        ));
+        let expected = "through \"cube\"; move it by at most 20 mm per step";
+        assert!(jump.contains("x.lua:10: ") && jump.contains(expected), "{jump}");
+    }
+    // Away from bodies, and out of contact, a solid may move as far as it likes.
+    for free in ["0.5, 0, 0.02", "0, 0.5, 0.5"] {
+        let actions = format!("body('cube', 0) solid('pad', 0.0401):move_to {{ {free} }}\n  world:step()");
+        assert_eq!(world(&actions).run("x.lua").rows().len(), 1, "{free}");
+    }
+}

@@ -1,20 +1,33 @@
-//! Search for bodies that overlap, to reject impossible initial states.
+//! Search for bodies that overlap, to reject impossible initial states and motions.
 
-use super::{SoftBody, World, rigid_contacts::ColliderPair};
+use super::{KinematicFrame, SoftBody, World, rigid_contacts::ColliderPair};
 use crate::{
     contact::{Collider, CollisionGeometry},
     fem::FemState,
-    ids::ColliderId,
+    ids::{BodyId, ColliderId, ContactPartner, SoftId},
 };
-use softvt_geometry::{Aabb, Pose, Vec3, convex::Placed};
+use softvt_geometry::{Aabb, Pose, Quat, Vec3, convex::Placed};
 
 /// Two bodies that overlap.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Penetration {
-    /// Names of the colliders or soft bodies.
-    pub names: [String; 2],
+    /// The colliders or soft bodies.
+    pub bodies: [ContactPartner; 2],
     /// Distance of the deepest point from the other's surface, m.
     pub depth: f64,
+}
+
+/// A collider of a kinematic frame that one step moves through a soft body.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Sweep {
+    /// The collider.
+    pub collider: ColliderId,
+    /// The soft body.
+    pub body: SoftId,
+    /// Longest way of a point of the collider's bounds in the step, m.
+    pub distance: f64,
+    /// Longest way for which contact with the body is resolved: half of its thickness, m.
+    pub limit: f64,
 }
 
 impl World {
@@ -23,19 +36,44 @@ impl World {
         self.update_collider_motions();
         let mut found = self.collider_penetrations();
         for (index, soft) in self.soft.iter().enumerate() {
-            for (collider, motion) in self.colliders.iter().zip(&self.motions) {
-                let depth = depth_in_field(&soft.state, &motion.pose, &collider.bounds, &|p| {
-                    signed_distance(collider, p)
-                });
-                found.push(Penetration { names: [soft.name.clone(), collider.name.clone()], depth });
+            let id = SoftId::new(index);
+            for (at, (collider, motion)) in self.colliders.iter().zip(&self.motions).enumerate() {
+                let depth = depth_in_collider(&soft.state, &motion.pose, collider);
+                found.push(Penetration { bodies: [id.into(), ColliderId::new(at).into()], depth });
             }
-            for other in &self.soft[index + 1..] {
+            for (at, other) in self.soft.iter().enumerate().skip(index + 1) {
                 let depth = depth_in_soft(&soft.state, other).max(depth_in_soft(&other.state, soft));
-                found.push(Penetration { names: [soft.name.clone(), other.name.clone()], depth });
+                found.push(Penetration { bodies: [id.into(), SoftId::new(at).into()], depth });
             }
         }
         found.retain(|penetration| penetration.depth > tolerance);
         found
+    }
+
+    /// The first kinematic collider that the next step would move into a soft body, by more than half of the body's
+    /// thickness: contact acts along the normals at the start of a step, so that such a collider may pass through.
+    pub fn kinematic_sweep(&self) -> Option<Sweep> {
+        /// Poses per limit at which the collider is compared with the body.
+        const POSES_PER_LIMIT: f64 = 8.0;
+        self.colliders.iter().enumerate().find_map(|(at, collider)| {
+            let BodyId::Kinematic(frame) = collider.parent else { return None };
+            let frame = self.kinematic(frame);
+            let distance = longest_way(frame, collider);
+            let sweeps = |body: &FemState| {
+                let limit = 0.5 * Aabb::from_points(&body.x)?.size().min();
+                let depth = |share| {
+                    depth_in_collider(body, &(between(frame, share) * collider.pose_in_parent), collider)
+                };
+                let count = (POSES_PER_LIMIT * distance / limit).ceil();
+                let enters = || (1..=count as usize).any(|k| depth(k as f64 / count) > depth(0.0));
+                (distance > limit && enters()).then_some(limit)
+            };
+            let mut bodies = self.soft.iter().enumerate();
+            bodies.find_map(|(body, soft)| {
+                let (collider, body) = (ColliderId::new(at), SoftId::new(body));
+                Some(Sweep { collider, body, distance, limit: sweeps(&soft.state)? })
+            })
+        })
     }
 
     fn collider_penetrations(&self) -> Vec<Penetration> {
@@ -43,21 +81,40 @@ impl World {
         self.near_pairs(&mut pairs);
         let penetration = |&ColliderPair { a, b, .. }: &ColliderPair| {
             let (a, b) = (a.min(b), a.max(b));
-            let [first, second] = [self.collider(a), self.collider(b)];
             let placed = |id: ColliderId| {
                 let shape = self.collider(id).collision_geometry.as_deref()?;
                 Some(Placed { shape, pose: self.motions[id.index()].pose })
             };
             let depth = CollisionGeometry::depth(placed(a)?, placed(b)?);
-            Some(Penetration { names: [first.name.clone(), second.name.clone()], depth })
+            Some(Penetration { bodies: [a.into(), b.into()], depth })
         };
         pairs.iter().filter_map(penetration).collect()
     }
 }
 
-/// Signed distance from a collider's surface, m.
-fn signed_distance(collider: &Collider, p: &Vec3) -> f64 {
-    collider.surface.contact(p, &Vec3::zeros(), 0.0).gap
+/// Longest way of a corner of a collider's bounds in the next step of its frame, m.
+fn longest_way(frame: &KinematicFrame, collider: &Collider) -> f64 {
+    let Aabb { min, max } = collider.bounds;
+    let corner = |i: usize| Vec3::from_fn(|axis, _| if i >> axis & 1 == 0 { min[axis] } else { max[axis] });
+    let way = |i: usize| {
+        let corner = collider.pose_in_parent * nalgebra::Point3::from(corner(i));
+        (frame.next * corner - frame.pose * corner).norm()
+    };
+    (0..8).map(way).fold(0.0, f64::max)
+}
+
+/// Pose of a frame after a share (0..=1) of its next step.
+fn between(frame: &KinematicFrame, share: f64) -> Pose {
+    let KinematicFrame { pose, next } = frame;
+    let turn = (next.rotation * pose.rotation.inverse()).scaled_axis();
+    let position = pose.translation.vector.lerp(&next.translation.vector, share);
+    Pose::from_parts(position.into(), Quat::from_scaled_axis(share * turn) * pose.rotation)
+}
+
+/// Depth of the deepest sample of a soft body in a collider at `pose` in the world, m.
+fn depth_in_collider(body: &FemState, pose: &Pose, collider: &Collider) -> f64 {
+    let field = |p: &Vec3| collider.surface.contact(p, &Vec3::zeros(), 0.0).gap;
+    depth_in_field(body, pose, &collider.bounds, &field)
 }
 
 /// Depth of the deepest sample of a soft body under another's surface, m.

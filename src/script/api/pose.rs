@@ -15,6 +15,9 @@ pub(crate) const ANGLES: Range = Range::closed(-FULL_TURN, FULL_TURN);
 #[expect(clippy::approx_constant, reason = "messages show it")]
 const FULL_TURN: f64 = 6.2832;
 
+/// Share of the way between two poses.
+const SHARE: Type = Type::Number("", Range::closed(0.0, 1.0));
+
 /// Divides the numbers by the largest magnitude, so that no square over- or underflows. `None` if that is too small or
 /// not finite.
 fn normalized_to_max<const N: usize>(numbers: [f64; N]) -> Option<[f64; N]> {
@@ -123,7 +126,7 @@ class! {
                 LuaPose(Pose::from_parts(this.0.translation, rotation * this.0.rotation))
             }
             /// Returns a pose between this one (at a share of 0) and another (at 1).
-            fn interpolate(_, this, other: LuaPose, share: f64) -> ["softvt.Pose"] {
+            fn interpolate(_, this, other: LuaPose, share: f64 = SHARE) -> ["softvt.Pose"] {
                 let at = this.0.translation.vector.lerp(&other.0.translation.vector, share);
                 // Between opposite orientations the shortest rotation is not unique, and slerp undefined.
                 let rotation = this.0.rotation.try_slerp(&other.0.rotation, share, 1e-12);

@@ -19,18 +19,21 @@ use crate::{
         watchdog::Clock,
     },
 };
-use softvt_common::cancel;
-use softvt_common::parallel::lock;
+use softvt_common::{
+    cancel,
+    parallel::lock,
+    text::{format_number, significant},
+};
 use softvt_evaluation::deformation::{Deformation, ReferenceShape};
 use softvt_geometry::{Pose, Quat, Vec3};
 use softvt_physics::{
-    BodyId, ColliderId, KinematicId, PhysicsParams, SoftId, World,
+    BodyId, ColliderId, ContactPartner, KinematicId, PhysicsParams, SoftId, World,
     contact::{Collider, Friction, SurfaceStiffness},
     fem::{FemState, StrainLimits, StrainMeter},
     world::{ContactSummary, SoftBody, StepFailure},
 };
 use softvt_robot::{PadSpec, pads::PadSurface};
-use softvt_rollout::soft_model;
+use softvt_rollout::{MAX_OVERLAP, soft_model};
 use softvt_scene::SoftMaterial;
 
 /// Approximate memory of a world and of one of its solids.
@@ -142,6 +145,33 @@ struct Inner {
     reserved: Vec<Reservation>,
 }
 
+impl Inner {
+    /// Refuses a body or solid that has been added where it overlaps another.
+    fn refuse_overlap(&mut self, lua: &Lua, added: ContactPartner) -> mlua::Result<()> {
+        let found = self.world.penetrations(MAX_OVERLAP);
+        let mut found = found.iter().filter(|penetration| penetration.bodies.contains(&added));
+        let Some(penetration) = found.next() else { return Ok(()) };
+        let [first, second] = penetration.bodies.map(|body| self.world.partner_name(body));
+        let depth = significant(1e3 * penetration.depth, 3);
+        Err(fail(
+            lua,
+            format!("{first:?} and {second:?} overlap by {depth} mm at the start; move them apart"),
+        ))
+    }
+
+    /// Refuses a step in which a kinematic solid would pass through a body.
+    fn refuse_sweep(&self, lua: &Lua) -> mlua::Result<()> {
+        let Some(sweep) = self.world.kinematic_sweep() else { return Ok(()) };
+        let (solid, body) = (&self.world.collider(sweep.collider).name, &self.world.soft(sweep.body).name);
+        let [distance, limit] = [sweep.distance, sweep.limit].map(|length| significant(1e3 * length, 3));
+        let message = format!(
+            "world:step: {solid:?} moves {distance} mm in one step, through {body:?}; move it by at most {limit} mm per \
+             step (half the thickness of the body) where they touch"
+        );
+        Err(fail(lua, message))
+    }
+}
+
 type SharedWorld = Arc<Mutex<Inner>>;
 
 fn pose(position: [f64; 3], axis_angle: Option<[f64; 3]>) -> Pose {
@@ -236,6 +266,7 @@ impl LuaWorld {
         inner.strains.push(strains);
         inner.stable_strains.push(body.stable_strain());
         inner.reserved.push(reserved);
+        inner.refuse_overlap(lua, id.into())?;
         Ok(LuaBody { world: self.0.clone(), id })
     }
 
@@ -251,6 +282,7 @@ impl LuaWorld {
             None => (BodyId::World, at),
         };
         let collider = world.add_shape(&spec.name, parent, pose, spec.shape.shape(), spec.friction);
+        inner.refuse_overlap(lua, collider.into())?;
         Ok(LuaSolid { world: self.0.clone(), kinematic, collider })
     }
 
@@ -267,6 +299,7 @@ impl LuaWorld {
         let parent = BodyId::Kinematic(carrier);
         let collider = Collider::new(&spec.name, parent, gel_pose_on_carrier(), surface, friction, stiffness);
         let collider = world.add_collider(collider);
+        inner.refuse_overlap(lua, collider.into())?;
         Ok(LuaSolid { world: self.0.clone(), kinematic: Some(carrier), collider })
     }
 
@@ -286,6 +319,7 @@ impl LuaWorld {
             ));
         }
         let _pause = inner.clock.pause();
+        inner.refuse_sweep(lua)?;
         let Inner { world, timing, .. } = inner;
         let dt = world.params.dt;
         inner.failed = timing.measure(dt, || world.step()).err();
@@ -301,7 +335,7 @@ class! {
     LuaWorld: "softvt.World" {
         label(_) { "world".to_owned() }
         methods {
-            /// Adds a soft body.
+            /// Adds a soft body. A body that overlaps another or a solid by more than 1 mm is an error.
             fn soft(lua, this) takes spec "softvt.WorldSoft" {
                 /// Name in messages.
                 name: String => Text("body");
@@ -407,8 +441,14 @@ class! {
             /// damage_strain; nil if it states none.
             fn stable_strain(_, this) -> ["number?"] { lock(&this.world).stable_strains[this.id.index()] }
             /// Returns the compressive strain that `percent` of the volume stays below: 1 − σ_min(F) at the Gauss
-            /// points, weighted by volume.
+            /// points, weighted by volume. 95 is usual; a number above 0 and at most 1 is most likely a share, and an
+            /// error.
             fn strain_percentile(lua, this, percent: f64 = PERCENT) -> ["number"] {
+                if percent > 0.0 && percent <= 1.0 {
+                    let (given, meant) = (format_number(percent), significant(100.0 * percent, 6));
+                    let message = format!("body:strain_percentile: expected percent, got {given}; did you mean {meant}?");
+                    return Err(fail(lua, message));
+                }
                 let strain = this.strain(|meter, state| meter.percentile(state, 1.0 - percent / 100.0));
                 finite(strain).ok_or_else(|| fail(lua, "body:strain_percentile: the body has no finite strain"))?
             }
@@ -459,7 +499,7 @@ class! {
         label(_) { "solid".to_owned() }
         methods {
             /// Prescribes the pose after the next step: position, m, and orientation as axis-angle, rad (none by
-            /// default).
+            /// default). To move it into a soft body by more than half of the body's thickness in one step is an error.
             fn move_to(lua, this, position: [f64; 3] = POSITION, axis_angle: Option<[f64; 3]> = AXIS_ANGLE) -> [] {
                 let Some(id) = this.kinematic else {
                     let message = "solid:move_to: a static solid cannot move; make it with world:kinematic";
