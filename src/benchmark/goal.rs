@@ -1,7 +1,7 @@
 //! Goals of tasks: predicates of the true scene, and their combinations.
 
 use serde::{Deserialize, Serialize};
-use softvt_common::text::format_number;
+use softvt_common::text::exact_number;
 
 /// Success condition of a task, judged at every control step.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -117,6 +117,16 @@ impl Side {
             Self::Behind => "behind",
         }
     }
+
+    /// The side on which the other one of two objects is.
+    pub fn opposite(self) -> Self {
+        match self {
+            Self::LeftOf => Self::RightOf,
+            Self::RightOf => Self::LeftOf,
+            Self::InFrontOf => Self::Behind,
+            Self::Behind => Self::InFrontOf,
+        }
+    }
 }
 
 impl Goal {
@@ -203,7 +213,7 @@ impl Goal {
             Self::Opened { joint, .. } => format!("{joint} open"),
             Self::Closed { joint, .. } => format!("{joint} closed"),
             Self::Turned { joint, range: [low, high] } => {
-                format!("{joint} turned to {}..{}", format_number(*low), format_number(*high))
+                format!("{joint} turned to {}..{}", exact_number(*low), exact_number(*high))
             }
             Self::Near { of: Placement { object, target, .. }, .. } => format!("{object} near {target}"),
             Self::Beside { side, of: Placement { object, target, .. }, .. } => {

@@ -160,22 +160,14 @@ impl Settings {
                 return Err(SettingsError::Group { path: path.to_owned(), fields: fields(at) });
             }
             (present, Ok(value)) if present.is_u64() => whole_number(path, &value)?,
+            (present, Ok(value)) if is_other_kind(present, &value) => {
+                return Err(wrong_type(path, present, &value.to_string()));
+            }
             (_, Ok(value)) => value,
             (Value::String(_), Err(_)) => Value::String(value.to_owned()),
             (present, Err(_)) => match fraction(value).filter(|_| present.is_number()) {
                 Some(number) => json!(number),
-                None => {
-                    let expected = match present.is_boolean() {
-                        true => "true or false",
-                        false if present.is_u64() => count_of(path),
-                        false => "a number",
-                    };
-                    return Err(SettingsError::Type {
-                        path: path.to_owned(),
-                        expected,
-                        value: value.to_owned(),
-                    });
-                }
+                None => return Err(wrong_type(path, present, value)),
             },
         };
         serde_json::from_value(tree).map_err(refused)
@@ -279,6 +271,21 @@ fn whole_number(path: &str, value: &Value) -> Result<Value, SettingsError> {
     }
 }
 
+/// True if a setting is a switch or a number, and a value for it is not.
+fn is_other_kind(present: &Value, value: &Value) -> bool {
+    (present.is_boolean() && !value.is_boolean()) || (present.is_number() && !value.is_number())
+}
+
+/// Error of a value that is not of the type of a setting.
+fn wrong_type(path: &str, present: &Value, value: &str) -> SettingsError {
+    let expected = match present.is_boolean() {
+        true => "true or false",
+        false if present.is_u64() => count_of(path),
+        false => "a number",
+    };
+    SettingsError::Type { path: path.to_owned(), expected, value: value.to_owned() }
+}
+
 /// The values of a whole-number setting, for messages.
 fn count_of(path: &str) -> &'static str {
     match path {
@@ -350,6 +357,15 @@ mod tests {
             );
         }
         assert!(settings.with("physics.dt", "-1").is_err_and(|e| e.to_string().contains("physics.dt")));
+        for (path, value, expected) in [
+            ("criteria.require_no_slip", "1", "expected true or false, got \"1\""),
+            ("physics.dt", "true", "expected a number, got \"true\""),
+        ] {
+            assert_eq!(
+                settings.with(path, value).expect_err(path).to_string(),
+                format!("{path}: {expected}")
+            );
+        }
         let pads =
             |mu: &str| ["static_mu", "dynamic_mu"].map(|key| (format!("robot.pads.{key}"), mu.to_owned()));
         assert!(settings.with("robot.pads.static_mu", "0").is_err(), "the dynamic one would be above it");
@@ -366,7 +382,7 @@ mod tests {
             assert_eq!(steps_per_control(dt), steps);
             assert!(with_dt(dt).is_ok());
         }
-        assert!(with_dt(1.0 / 50.0).is_err_and(|e| e.to_string().contains("0.016666666666666666 and 0.025")));
+        assert!(with_dt(1.0 / 50.0).is_err_and(|e| e.to_string().contains("0.0166667 and 0.025")));
     }
 
     #[test]

@@ -1,6 +1,6 @@
 //! Ranges of numbers: what a parameter may be, in settings, materials and scripts.
 
-use super::text::format_number;
+use super::text::{exact_number, format_number};
 
 /// Bounds of a finite number; either end may be excluded.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -77,7 +77,14 @@ impl Range {
             return Ok(());
         }
         let expected = self.expected("a number", unit);
-        Err(RangeError { path: path.to_owned(), expected, value: format_number(value) })
+        Err(RangeError { path: path.to_owned(), expected, value: self.show_outside(value) })
+    }
+
+    /// A value outside of the range for a message: all of its digits where a rounded one would be inside.
+    pub fn show_outside(&self, value: f64) -> String {
+        let shown = format_number(value);
+        let is_inside = shown.parse().is_ok_and(|shown| self.contains(shown));
+        if is_inside { exact_number(value) } else { shown }
     }
 
     /// A value of this range in words, where `noun` says what it is: `a number in 0..0.5 (rad)`.
@@ -118,6 +125,12 @@ mod tests {
         assert_eq!(ends(Range::POSITIVE), [false, true, true]);
         let not_finite = [f64::NAN, f64::INFINITY, f64::NEG_INFINITY];
         assert!(not_finite.iter().all(|value| !Range::ANY.contains(*value)));
+    }
+
+    #[test]
+    fn a_value_outside_of_a_range_is_not_rounded_into_it() {
+        let shown = |value| Range::closed(0.0, 1.0).show_outside(value);
+        assert_eq!([1.0 + 1e-15, 1.0 + 0.1 + 0.2].map(shown), ["1.000000000000001", "1.3"]);
     }
 
     #[test]

@@ -27,7 +27,7 @@ use serde_json::Value;
 
 use super::{
     range::{Range, RangeError},
-    text::format_number,
+    text::exact_number,
 };
 
 /// One setting, for documentation.
@@ -48,7 +48,7 @@ impl Setting {
     pub fn default_text(&self) -> String {
         match &self.default {
             Value::Null => "that of the scene".to_owned(),
-            Value::Number(number) => number.as_f64().map_or_else(|| number.to_string(), format_number),
+            Value::Number(number) => number.as_f64().map_or_else(|| number.to_string(), exact_number),
             Value::String(text) => text.clone(),
             other => other.to_string(),
         }

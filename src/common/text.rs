@@ -5,8 +5,21 @@ use std::borrow::Cow;
 /// Longest prompt, name or other short text of a script, bytes. Plans copy texts, which scripts may share.
 pub const MAX_TEXT_BYTES: usize = 4096;
 
-/// Formats a number in decimal, or in scientific notation if it is below 1e-6 or at least 1e9 in magnitude.
+/// Names of the axes of a frame, by index.
+pub const AXIS_NAMES: [&str; 3] = ["x", "y", "z"];
+
+/// Formats a number for a message, in decimal, or in scientific notation if it is below 1e-6 or at least 1e9 in
+/// magnitude. Of a number with more than 15 digits, which arithmetic gives and nobody writes, six are kept.
 pub fn format_number(x: f64) -> String {
+    const WRITTEN_DIGITS: usize = 15;
+    let exact = exact_number(x);
+    let mantissa = exact.split('e').next().unwrap_or_default();
+    let digits = mantissa.trim_start_matches(['-', '0', '.']).chars().filter(char::is_ascii_digit).count();
+    if digits > WRITTEN_DIGITS { significant(x, 6) } else { exact }
+}
+
+/// Formats a number with all of its digits, as records keep it; the notation is that of [`format_number`].
+pub fn exact_number(x: f64) -> String {
     let plain = x == 0.0 || !x.is_finite() || (1e-6..1e9).contains(&x.abs());
     if plain { x.to_string() } else { format!("{x:e}") }
 }
@@ -14,13 +27,13 @@ pub fn format_number(x: f64) -> String {
 /// Formats a number with at most `digits` significant digits and without trailing zeros: 4/3 as 1.33.
 pub fn significant(x: f64, digits: usize) -> String {
     if x == 0.0 || !x.is_finite() {
-        return format_number(x);
+        return exact_number(x);
     }
     let scale = 10f64.powi(digits as i32 - 1 - x.abs().log10().floor() as i32);
     // A division by a power of ten gives the nearest number; a product need not.
     let rounded =
         if scale >= 1.0 { (x * scale).round() / scale } else { (x * scale).round() * (1.0 / scale) };
-    format_number(if rounded.is_finite() { rounded } else { x })
+    exact_number(if rounded.is_finite() { rounded } else { x })
 }
 
 /// Escapes control characters other than newlines and tabs, so that untrusted text cannot control a terminal.
@@ -224,6 +237,10 @@ mod tests {
     fn numbers_stay_short() {
         let shown = [0.0, -1.0, 0.25, 1234567.5, 1e300, -1e-9, f64::INFINITY].map(format_number);
         assert_eq!(shown, ["0", "-1", "0.25", "1234567.5", "1e300", "-1e-9", "inf"]);
+        let computed = [0.1 + 0.2, -1.0 / 3.0, 2.0 / 3.0 * 1e12, std::f64::consts::PI, 0.1234567];
+        let shown = computed.map(format_number);
+        assert_eq!(shown, ["0.3", "-0.333333", "6.66667e11", "3.14159", "0.1234567"]);
+        assert_eq!(exact_number(0.1 + 0.2), "0.30000000000000004");
     }
 
     #[test]

@@ -31,6 +31,7 @@ impl Asset {
         let (own, others) = (self.friction.static_mu, Friction::STANDARD.static_mu);
         let is_free = matches!(self.body, Body::Soft(_) | Body::Rigid { .. });
         (is_free && !self.friction.coated && own < others).then(|| {
+            let own = format_number(own);
             format!(
                 "friction.static_mu is {own}, and a pair of surfaces takes the larger coefficient, which is at least {others} on \
                  tables and pads; for a slippery surface add coated = true"
@@ -84,12 +85,13 @@ fn part_warning(part: &MovingPart) -> Option<String> {
 
 fn youngs_warning(pascals: f64) -> Option<String> {
     if pascals < MIN_YOUNGS_PA {
-        let converted = 1e3 * pascals;
+        let (pascals, converted) = (format_number(pascals), format_number(1e3 * pascals));
         return Some(format!(
             "youngs_pa is {pascals} Pa, softer than a gel; did you mean {pascals} kPa, youngs_pa = {converted}?"
         ));
     }
     (pascals > MAX_YOUNGS_PA).then(|| {
+        let pascals = format_number(pascals);
         format!("youngs_pa is {pascals} Pa, stiffer than rubber; give it in Pa, or use softvt.rigid for a hard object")
     })
 }

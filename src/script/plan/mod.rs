@@ -40,7 +40,10 @@ use softvt_benchmark::{
     Condition, Goal, ObjectType, Plan, Shift, ShiftValue, Suite, Task, TaskDifference,
     goal_conflict::conflict, metric::Metric, seed::SecretSeed, settings::Settings,
 };
-use softvt_common::{parallel::lock, text::unknown_name};
+use softvt_common::{
+    parallel::lock,
+    text::{format_number, unknown_name},
+};
 
 /// Kind of the main file of a script.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -512,6 +515,7 @@ fn task(lua: &Lua, id: usize, spec: &Constructed<TaskSpec>, budget: u32) -> mlua
         if let Goal::Turned { range: [low, high], .. } = goal
             && low > high
         {
+            let [low, high] = [low, high].map(|value| format_number(*value));
             let message =
                 format!("task.goal.range: the lowest value {low} is above the highest, {high}; swap them");
             return Err(fail_at_key(lua, table, "range", message));

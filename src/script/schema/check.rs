@@ -6,7 +6,7 @@ use mlua::{Lua, Table, Value};
 
 use super::{Field, FieldDefault, Range, Record, Type, ValidationError, joined};
 use crate::vm::{
-    error::{SourceLine, current_line, fail, fail_at},
+    error::{SourceLine, caller_line, current_line, fail, fail_at},
     list::plain,
     source_map,
     value::{describe, number, sorted_pairs},
@@ -27,7 +27,7 @@ impl Type {
             return Err(ValidationError::new(format!("expected UTF-8 text, got {}", describe(value))));
         }
         let wrong = || {
-            let error = self.expected(&describe(value));
+            let error = self.expected(&self.describe_wrong(value));
             match (self, number(value)) {
                 (Self::Number("rad", _), Some(_)) => {
                     ValidationError::new(format!("{}; math.rad converts degrees", error.message))
@@ -105,6 +105,14 @@ impl Type {
         }
     }
 
+    /// A value that the type refuses, in words.
+    fn describe_wrong(&self, value: &Value) -> String {
+        match (self, number(value)) {
+            (Self::Number(_, range), Some(number)) if number.is_finite() => range.show_outside(number),
+            _ => describe(value),
+        }
+    }
+
     fn expected(&self, got: &str) -> ValidationError {
         ValidationError::new(format!("expected {}, got {got}", self.describe()))
     }
@@ -132,7 +140,8 @@ impl Type {
             number.ok_or_else(|| {
                 let is_angle = matches!(self, Self::Vector(_, unit, _) if unit.starts_with("rad"));
                 let hint = if is_angle { "; math.rad converts degrees" } else { "" };
-                let message = format!("expected a number{}, got {}{hint}", range.describe(), describe(value));
+                let got = Self::Number("", range).describe_wrong(value);
+                let message = format!("expected a number{}, got {got}{hint}", range.describe());
                 ValidationError::new(message).inside(format!("[{}]", index + 1))
             })
         });
@@ -325,11 +334,7 @@ pub(crate) fn error_at_key(lua: &Lua, label: &str, error: &ValidationError) -> m
 /// The error of a function of a script about a table that it was given, at the line of the file that called the
 /// function.
 pub(crate) fn error_of_caller(lua: &Lua, label: &str, error: &ValidationError) -> mlua::Error {
-    let line = |level| lua.inspect_stack(level, SourceLine::running);
-    let mut lines = (0..).map_while(line).flatten();
-    let own = lines.next();
-    let caller = own.as_ref().and_then(|own| lines.find(|line| line.file != own.file));
-    error_at(lua, caller.or(own), label, error)
+    error_at(lua, caller_line(lua), label, error)
 }
 
 fn error_at(lua: &Lua, call: Option<SourceLine>, label: &str, error: &ValidationError) -> mlua::Error {

@@ -215,6 +215,15 @@ pub(crate) fn author_line(lua: &Lua) -> Option<SourceLine> {
     own_line(lua).or_else(|| running_lines(lua).last())
 }
 
+/// Line of the author's that called, from another file, the innermost script function on the stack. Without one, that
+/// of [`author_line`].
+pub(crate) fn caller_line(lua: &Lua) -> Option<SourceLine> {
+    let own = current_line(lua)?;
+    let mut lines = running_lines(lua);
+    let caller = lines.find(|line| line.file != own.file && !is_library(lua, &line.file));
+    caller.or_else(|| author_line(lua))
+}
+
 /// Line of the innermost function on the stack that is the author's own.
 fn own_line(lua: &Lua) -> Option<SourceLine> {
     running_lines(lua).find(|line| !is_library(lua, &line.file))
