@@ -2,13 +2,16 @@
 
 use std::collections::BTreeMap;
 
-use crate::goal::{Goal, Parts};
+use softvt_common::text::significant;
+
+use crate::goal::{Goal, Parts, Placement, Side};
 
 /// The reason for which a goal can never be met, in words; `None` if none was found.
 ///
 /// Predicates that must hold at once are compared in pairs, and what rests on what must not be a circle. Of
-/// `softvt.any`, each alternative is compared with what must hold at the same time. Geometry is not considered, and
-/// shares of a joint are compared with its values only in a goal of [`Goal::with_joint_ranges`].
+/// `softvt.any`, each alternative is compared with what must hold at the same time. Of geometry, only distances of the
+/// same two objects are considered, and shares of a joint are compared with its values only in a goal of
+/// [`Goal::with_joint_ranges`].
 pub fn conflict(goal: &Goal) -> Option<String> {
     let moment = Moment::of(goal);
     if let Some(found) = moment.conflict() {
@@ -109,6 +112,12 @@ impl<'a> Moment<'a> {
         if let Some(both) = self.required.iter().find(|goal| self.forbidden.contains(goal)) {
             return Some(format!("{:?} must hold and must not hold", both.describe()));
         }
+        for forbidden in &self.forbidden {
+            if let Some(required) = self.required.iter().find(|required| implies(required, forbidden)) {
+                let [required, forbidden] = [required, forbidden].map(|goal| with_limit(goal));
+                return Some(format!("{required} must hold and {forbidden} must not, which follows from it"));
+            }
+        }
         for (at, first) in self.required.iter().enumerate() {
             if let Some(other) = self.required[at + 1..].iter().find(|other| excludes(first, other)) {
                 let [first, other] = [first, other].map(|goal| goal.describe());
@@ -152,20 +161,70 @@ fn excludes(first: &Goal, other: &Goal) -> bool {
         }
         // Both are within 45° of their directions.
         (Goal::Beside { side, of, .. }, Goal::Beside { side: another, of: same, .. }) => {
-            side != another && (&of.object, &of.target) == (&same.object, &same.target)
+            side_in_pair(*another, same, of).is_some_and(|another| another != *side)
         }
-        (Goal::Near { of, distance_m: most }, Goal::Beside { of: same, distance_m: least, .. })
-        | (Goal::Beside { of, distance_m: least, .. }, Goal::Near { of: same, distance_m: most }) => {
-            (&of.object, &of.target) == (&same.object, &same.target) && least > most
+        (Goal::Near { of, distance_m: most }, Goal::Beside { side, of: same, distance_m: least })
+        | (Goal::Beside { side, of, distance_m: least }, Goal::Near { of: same, distance_m: most }) => {
+            side_in_pair(*side, of, same).is_some() && least > most
         }
         _ => false,
     }
 }
 
+/// True if a predicate that holds makes another one of the same two objects, the same object or the same joint hold.
+fn implies(holds: &Goal, other: &Goal) -> bool {
+    match (holds, other) {
+        (Goal::Near { of, distance_m }, Goal::Near { of: same, distance_m: most }) => {
+            is_same_pair(of, same) && distance_m <= most
+        }
+        (
+            Goal::Beside { side, of, distance_m },
+            Goal::Beside { side: another, of: same, distance_m: least },
+        ) => side_in_pair(*another, same, of) == Some(*side) && distance_m >= least,
+        (Goal::Upright { object, angle_rad, .. }, Goal::Upright { object: same, angle_rad: most, .. }) => {
+            object == same && angle_rad <= most
+        }
+        (Goal::Opened { joint, share }, Goal::Opened { joint: same, share: least }) => {
+            joint == same && share >= least
+        }
+        (Goal::Closed { joint, share }, Goal::Closed { joint: same, share: most }) => {
+            joint == same && share <= most
+        }
+        (Goal::Turned { joint, range: [low, high] }, Goal::Turned { joint: same, range: [from, to] }) => {
+            joint == same && from <= low && high <= to
+        }
+        _ => false,
+    }
+}
+
+/// True if two placements are about the same two objects, in any order.
+fn is_same_pair(of: &Placement, other: &Placement) -> bool {
+    [(&of.object, &of.target), (&of.target, &of.object)].contains(&(&other.object, &other.target))
+}
+
+/// The side on which the object of `as_in` is of its target, if the objects of `of` are the same two and its object is
+/// on `side` of its target.
+fn side_in_pair(side: Side, of: &Placement, as_in: &Placement) -> Option<Side> {
+    is_same_pair(of, as_in).then(|| if of.object == as_in.object { side } else { side.opposite() })
+}
+
+/// A predicate with the limit that tells it from others of the same words.
+fn with_limit(goal: &Goal) -> String {
+    let mm = |metres: f64| format!("{} mm", significant(1e3 * metres, 4));
+    let limit = match goal {
+        Goal::Near { distance_m, .. } => format!(" (at most {})", mm(*distance_m)),
+        Goal::Beside { distance_m, .. } => format!(" (at least {})", mm(*distance_m)),
+        Goal::Upright { angle_rad, .. } => format!(" (within {}°)", significant(angle_rad.to_degrees(), 4)),
+        Goal::Opened { share, .. } => format!(" (at least {} %)", significant(1e2 * share, 4)),
+        Goal::Closed { share, .. } => format!(" (at most {} %)", significant(1e2 * share, 4)),
+        _ => String::new(),
+    };
+    format!("{:?}{limit}", goal.describe())
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{Placement, goal::Side};
 
     fn on(object: &str, target: &str) -> Goal {
         Goal::On(Placement { object: object.into(), target: target.into(), hold_s: 0.4 })
@@ -182,6 +241,10 @@ mod tests {
     fn beside(side: Side) -> Goal {
         let of = Placement { object: "a".into(), target: "b".into(), hold_s: 0.0 };
         Goal::Beside { side, of, distance_m: 0.05 }
+    }
+
+    fn near(object: &str, target: &str, distance_m: f64) -> Goal {
+        Goal::Near { of: Placement { object: object.into(), target: target.into(), hold_s: 0.4 }, distance_m }
     }
 
     fn all(goals: Vec<Goal>) -> Goal {
@@ -216,6 +279,28 @@ mod tests {
         found(all(vec![opened(0.7), any(vec![closed(0.1), none(vec![opened(0.7)])])]), "drawer open");
         found(sequence(vec![all(vec![opened(0.7), closed(0.1)]), on("a", "b")]), "cannot hold at once");
         found(none(vec![none(vec![opened(0.7)]), opened(0.7)]), "must hold and must not hold");
+    }
+
+    #[test]
+    fn distances_of_the_same_two_objects_are_compared() {
+        let found = |goals: Vec<Goal>| conflict(&all(goals)).unwrap_or_default();
+        assert_eq!(
+            found(vec![near("a", "b", 0.05), none(vec![near("b", "a", 0.15)])]),
+            "\"a near b\" (at most 50 mm) must hold and \"b near a\" (at most 150 mm) must not, which follows from it"
+        );
+        assert_eq!(found(vec![near("a", "b", 0.15), none(vec![near("a", "b", 0.05)])]), "");
+        assert_eq!(found(vec![near("a", "b", 0.05), none(vec![near("a", "c", 0.15)])]), "");
+        let reversed = |side| {
+            let of = Placement { object: "b".into(), target: "a".into(), hold_s: 0.0 };
+            Goal::Beside { side, of, distance_m: 0.05 }
+        };
+        assert_eq!(found(vec![beside(Side::LeftOf), reversed(Side::RightOf)]), "");
+        assert!(found(vec![beside(Side::LeftOf), reversed(Side::LeftOf)]).contains("cannot hold at once"));
+        assert!(found(vec![near("b", "a", 0.04), beside(Side::Behind)]).contains("cannot hold at once"));
+        assert!(found(vec![beside(Side::LeftOf), none(vec![reversed(Side::RightOf)])]).contains("must not"));
+        let upright = |angle_rad| Goal::Upright { object: "a".into(), hold_s: 0.0, angle_rad };
+        assert!(found(vec![upright(0.1), none(vec![upright(0.2)])]).contains("(within 11.46°) must not"));
+        assert!(found(vec![opened(0.7), none(vec![opened(0.5)])]).contains("(at least 50 %) must not"));
     }
 
     #[test]
