@@ -8,7 +8,7 @@ use super::tasks::EXPERT;
 use crate::{
     schema::{Type, functions},
     vm::{
-        error::{SourceLine, author_line, fail, fail_at},
+        error::{SourceLine, caller_line, fail, fail_at},
         source_map::find_key,
         value::{number, sorted_pairs},
     },
@@ -61,7 +61,8 @@ functions! {
         /// `return softvt.check_names("nudge", run, spec, { object = "object" })`. The kinds of the fields of `spec`
         /// are "object" (one that moves), "place" (an object or a part), "joint" (a part, cabinet.top_drawer) and
         /// "value of joint" (a number in the range of the joint that the field `joint` names). Experts in `spec` are
-        /// checked as well. softvt check reports a wrong name at the line where the expert was made.
+        /// checked as well. softvt check reports a wrong name at the line of the file that called the function which
+        /// makes the expert.
         fn check_names(
             lua,
             label: String,
@@ -111,7 +112,7 @@ impl ExpertNames {
             fields.extend(content.map(|content| NamedField { key: key.clone(), content }));
         }
         let parts = sorted_pairs(spec).into_iter().filter_map(|(_, value)| value.as_function().cloned());
-        Ok(Self { label, made_at: author_line(lua), fields, parts: parts.collect() })
+        Ok(Self { label, made_at: caller_line(lua), fields, parts: parts.collect() })
     }
 }
 
