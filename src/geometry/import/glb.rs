@@ -80,7 +80,7 @@ pub(super) fn colours(bytes: &[u8]) -> Result<ImportedColours, String> {
     Ok(ImportedColours { materials, material_ids })
 }
 
-/// What the primitives of a scene state of their colours.
+/// Materials of the primitives of a scene.
 #[derive(Default)]
 struct Surfaces<'a> {
     blob: &'a [u8],

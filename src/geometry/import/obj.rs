@@ -122,6 +122,22 @@ fn normalised(bytes: &[u8]) -> String {
     text
 }
 
+/// Refuses a file that gives only some vertices colours (v x y z r g b): the crate takes those of others.
+fn check_vertex_colours(text: &str) -> Result<(), String> {
+    let vertices = text.lines().zip(1..).filter_map(|(line, number)| {
+        let mut words = line.split_whitespace();
+        (words.next() == Some("v")).then(|| (number, words.count() >= 6))
+    });
+    let mut vertices = vertices.peekable();
+    let Some(&(first, has_colour)) = vertices.peek() else { return Ok(()) };
+    let Some((other, _)) = vertices.find(|(_, has)| *has != has_colour) else { return Ok(()) };
+    let (with, without): (usize, usize) = if has_colour { (first, other) } else { (other, first) };
+    Err(format!(
+        "the vertex of line {with} has a colour (v x y z r g b), and that of line {without} has none; remove the colours \
+         of vertices, and store them in materials or in an image"
+    ))
+}
+
 /// The text of an OBJ file whose corners without texture coordinates are given (0, 0).
 fn with_coordinates_everywhere(text: &str) -> String {
     let corner = |corner: &str| {
@@ -148,7 +164,7 @@ fn with_coordinates_everywhere(text: &str) -> String {
     all
 }
 
-/// What editors of Windows write before a text.
+/// Byte order mark, with which some editors begin a file.
 const BYTE_ORDER_MARK: char = '\u{feff}';
 
 fn keyword_and_rest(line: &str) -> (&str, &str) {
@@ -226,6 +242,7 @@ pub(super) fn read(bytes: &[u8]) -> Result<Mesh, MeshImportError> {
         loaded.map(|(models, _)| models).map_err(|error| unreadable(error.to_string()))
     };
     let text = normalised(bytes);
+    check_vertex_colours(&text).map_err(unreadable)?;
     let mut models = load(&text)?;
     // The crate lists the coordinates of those that have some, without telling which.
     if models.iter().any(|model| !model.mesh.texcoords.is_empty() && !all_placed(&model.mesh)) {

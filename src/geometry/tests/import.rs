@@ -375,6 +375,16 @@ fn colours_of_vertices_are_refused_unless_they_change_nothing() {
     assert_eq!(coloured("1 1 1"), Ok(ImportedColours::default()));
     assert!(coloured("1 0 0").expect_err("red").starts_with("it has colours of vertices (v x y z r g b)"));
 
+    let partly = CUBE.lines().enumerate().map(|(index, line)| match index {
+        1 => format!("{line} 1 0 0\n"),
+        _ => format!("{line}\n"),
+    });
+    let error = read_obj(&partly.collect::<String>()).expect_err("one colour").to_string();
+    assert!(
+        error.contains("the vertex of line 2 has a colour (v x y z r g b), and that of line 1 has none"),
+        "{error}"
+    );
+
     let colours = |rgb: f32, component: &str| {
         let mut cube = Glb::new(&read_obj(CUBE).expect("a cube"));
         let start = cube.blob.len();
