@@ -7,18 +7,18 @@ use super::{
     joint_warnings::joint_warnings,
 };
 use softvt_benchmark::{CONTROL_DT, Task, goal_conflict::least_time};
-use softvt_common::text::{format_number, is_misspelt};
+use softvt_common::text::{format_number, is_misspelt, significant};
 use softvt_geometry::pieces::SeparatePieces;
-use softvt_robot::gripper::MAX_WIDTH;
+use softvt_robot::{gripper::MAX_WIDTH, panda::tool_in_hand};
 use softvt_scene::{
     Asset, Body, CARRY_PACE_HINT, Camera, CameraMount, EXPERT_HINTS, GRASP_HEIGHT_HINT, GRASP_WIDTH_HINT,
-    Object, Scene, SoftMaterial,
+    Lighting, Object, Scene, SoftMaterial,
 };
 
 /// Warnings about a scene of a task, one line each: materials, soft bodies of few voxels, bodies of several pieces or
 /// off their axis, joints of unlikely numbers, hints with misspelt names, a target that the gripper cannot grasp,
-/// objects outside of the workspace, cameras that do not show what the goal names, and a budget below what the goal
-/// takes.
+/// objects outside of the workspace, cameras that do not show what the goal names or the fingers, a scene without light,
+/// and a budget below what the goal takes.
 pub fn scene_warnings(task: &Task, scene: &Scene, cache: &AssetCache) -> BTreeSet<String> {
     let warnings = |asset: &Asset| {
         let name = asset.name.clone();
@@ -43,13 +43,26 @@ pub fn scene_warnings(task: &Task, scene: &Scene, cache: &AssetCache) -> BTreeSe
         scene.objects.iter().filter(|object| is_target(object) || is_place(object)).collect();
     all.extend(named.iter().filter_map(|object| workspace_warning(scene, object, cache)));
     all.extend(scene.cameras.iter().filter_map(|camera| view_warning(camera, &named, cache)));
+    all.extend(scene.cameras.iter().filter_map(reach_warning));
+    all.extend(light_warning(&scene.lighting));
     all.extend(budget_warning(task));
     all
 }
 
-/// A warning about a task whose budget ends before its goal can have held.
+/// Budget below which no manipulation is possible, control steps: the hand shuts in about as many.
+const MIN_BUDGET_STEPS: u32 = 10;
+
+/// A warning about a task whose budget ends before its goal can have held, or before an arm can have done anything.
 fn budget_warning(task: &Task) -> Option<String> {
     let (least_s, budget_s) = (least_time(&task.goal), f64::from(task.budget_steps) * CONTROL_DT);
+    if least_s <= budget_s && task.budget_steps < MIN_BUDGET_STEPS {
+        return Some(format!(
+            "task {}: budget_steps is {}, {} s; no episode can reach its goal in so few control steps (20 per second)",
+            task.id,
+            task.budget_steps,
+            significant(budget_s, 3)
+        ));
+    }
     (least_s > budget_s).then(|| {
         format!(
             "task {}: the goal must hold for {} s, and the budget is {} s: no episode can reach it",
@@ -117,6 +130,34 @@ fn view_warning(camera: &Camera, objects: &[&Object], cache: &AssetCache) -> Opt
             },
             format_number(camera.far_m)
         )
+    })
+}
+
+/// A warning about a camera on the hand whose images end before the fingers.
+fn reach_warning(camera: &Camera) -> Option<String> {
+    let distance = (tool_in_hand().translation.vector - camera.pose.translation.vector).norm();
+    (camera.mount == CameraMount::Hand && camera.far_m < distance).then(|| {
+        format!(
+            "camera {}: its far is {} m, and the tool centre point is {} m away, so that it shows neither the fingers nor \
+             what they hold; make far larger",
+            camera.name,
+            format_number(camera.far_m),
+            significant(distance, 3)
+        )
+    })
+}
+
+/// Radiance of a white surface below which images are black: 8-bit images begin at about 3e-4.
+const MIN_RADIANCE: f64 = 1e-3;
+
+/// A warning about a scene whose images are black.
+fn light_warning(light: &Lighting) -> Option<String> {
+    let Lighting { key, sky, exposure, .. } = light;
+    let largest = |colours: &[[f64; 3]]| colours.iter().flatten().fold(0.0, |max: f64, x| max.max(*x));
+    let of_sky = sky.strength * largest(&[sky.zenith, sky.horizon, sky.ground]);
+    (exposure * (key.strength * largest(&[key.colour]) + of_sky) < MIN_RADIANCE).then(|| {
+        "scene.light: it is so weak that the images of all cameras are black; raise strength, sky_strength or exposure"
+            .to_owned()
     })
 }
 

@@ -2,8 +2,9 @@
 
 use std::sync::OnceLock;
 
-use ab_glyph::{Font, FontRef, PxScale, ScaleFont, point};
+use ab_glyph::{Font, FontRef, GlyphId, PxScale, ScaleFont, point};
 use serde::Serialize;
+use softvt_geometry::Vec3;
 
 /// Typeface of a text decal.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
@@ -84,6 +85,19 @@ impl LabelLine {
         let font = font(self.typeface)?;
         self.text.chars().find(|&letter| letter.is_control() || font.glyph_id(letter).0 == 0)
     }
+
+    /// Length of the line without the margins of its raster, m.
+    pub fn length_m(&self) -> f64 {
+        let Some(font) = font(self.typeface) else { return 0.0 };
+        f64::from(place_letters(self, &font, 0.0, |_, _| ()) / CAPITAL) * self.height_m
+    }
+
+    /// Direction of the top of the letters before [`Self::turn`], object frame; `facing` is the unit vector of
+    /// [`Self::facing`].
+    pub fn up(&self, facing: &Vec3) -> Vec3 {
+        let head = if facing.z.abs() > 0.999 { Vec3::y() } else { Vec3::z() };
+        (head - facing * facing.dot(&head)).normalize()
+    }
 }
 
 fn font(typeface: Typeface) -> Option<FontRef<'static>> {
@@ -110,20 +124,14 @@ pub struct GlyphCoverage {
 impl GlyphCoverage {
     fn rasterize(line: &LabelLine) -> Self {
         let Some(font) = font(line.typeface) else { return Self::default() };
-        let em = CAPITAL / capital(&font);
+        let em = scale_of(&font);
         let thick = line.weight as f32 * CAPITAL;
-        let scaled = font.as_scaled(PxScale::from(em));
-        let mut across = MARGIN as f32 + thick;
+        let scaled = font.as_scaled(em);
         let mut glyphs = Vec::new();
-        let mut previous = None;
         let baseline = MARGIN as f32 + thick + scaled.ascent();
-        for letter in line.text.chars() {
-            let id = font.glyph_id(letter);
-            across += previous.map_or(0.0, |previous| scaled.kern(previous, id) + thick);
-            glyphs.push(id.with_scale_and_position(PxScale::from(em), point(across, baseline)));
-            across += scaled.h_advance(id);
-            previous = Some(id);
-        }
+        let across = place_letters(line, &font, MARGIN as f32 + thick, |id, across| {
+            glyphs.push(id.with_scale_and_position(em, point(across, baseline)));
+        });
         let width = (across + thick).ceil() as usize + MARGIN;
         let height = (baseline + thick - scaled.descent()).ceil() as usize + MARGIN;
         let mut cover = vec![0.0_f32; width * height];
@@ -182,6 +190,27 @@ impl GlyphCoverage {
         let bottom = at(i, j + 1) * (1.0 - u) + at(i + 1, j + 1) * u;
         top * (1.0 - v) + bottom * v
     }
+}
+
+/// Scale at which a capital letter has its height in the raster.
+fn scale_of(font: &FontRef) -> PxScale {
+    PxScale::from(CAPITAL / capital(font))
+}
+
+/// Calls `place` with each letter of a line and the place where it begins, texels, from `start` on. Returns where the
+/// line ends.
+fn place_letters(line: &LabelLine, font: &FontRef, start: f32, mut place: impl FnMut(GlyphId, f32)) -> f32 {
+    let scaled = font.as_scaled(scale_of(font));
+    let thick = line.weight as f32 * CAPITAL;
+    let (mut across, mut previous) = (start, None);
+    for letter in line.text.chars() {
+        let id = font.glyph_id(letter);
+        across += previous.map_or(0.0, |previous| scaled.kern(previous, id) + thick);
+        place(id, across);
+        across += scaled.h_advance(id);
+        previous = Some(id);
+    }
+    across
 }
 
 /// Height of a capital letter, in ems.
@@ -252,6 +281,13 @@ mod tests {
         let left = decal.coverage().share(-1.5e-3, 0.002, 2e-3);
         let right = decal.coverage().share(1.5e-3, 0.002, 2e-3);
         assert!(left > 3.0 * right, "the l is left of the stop: {left} {right}");
+    }
+
+    #[test]
+    fn the_length_of_a_line_is_that_of_its_raster_without_margins() {
+        let decal = letters("softvt", 0.1);
+        let margins = decal.coverage().length_m() - decal.line.length_m();
+        assert!((0.0..0.004).contains(&margins), "{margins}");
     }
 
     #[test]

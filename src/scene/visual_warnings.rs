@@ -1,12 +1,14 @@
 //! Visuals that are valid and cannot be seen.
 
+use std::f64::consts::TAU;
+
 use super::{
-    Asset, Body, MovingPart,
+    Asset, Body, LabelLine, MovingPart,
     decal::TextDecal,
     visual::{Mask, Visual},
 };
 use softvt_common::text::{format_number, significant};
-use softvt_geometry::{Aabb, Vec3};
+use softvt_geometry::{Aabb, Vec3, shape::Shape};
 
 impl Asset {
     /// Warnings about visuals and layers that are nowhere on its surface, or that of its parts.
@@ -36,7 +38,7 @@ impl Asset {
         });
         let bounds = shapes().fold(self.shape.loose_bounds(), |all, own| all.merged(&own.loose_bounds()));
         let hidden = self.visuals.iter().enumerate().flat_map(|(index, visual)| {
-            let found = hidden_layers(visual, &bounds);
+            let found = hidden_layers(visual, &bounds, &shapes);
             found.into_iter().map(move |warning| format!("visuals[{}].{warning}", index + 1))
         });
         unpainted.chain(hidden).collect()
@@ -46,13 +48,25 @@ impl Asset {
 /// Largest period of a pattern in sizes of the shape: a larger one is most likely given in another unit.
 const MAX_PERIOD: f64 = 4.0;
 
-fn hidden_layers(visual: &Visual, bounds: &Aabb) -> Vec<String> {
+fn hidden_layers<'a, S>(visual: &Visual, bounds: &Aabb, shapes: &impl Fn() -> S) -> Vec<String>
+where
+    S: Iterator<Item = &'a Shape>,
+{
     let found = visual.layers.iter().enumerate().filter_map(|(index, layer)| {
         let number = index + 1;
         if layer.opacity == 0.0 && layer.relief_m == 0.0 {
             return Some(format!("layers[{number}]: its opacity is 0, so that it changes nothing"));
         }
-        Some(format!("layers[{number}]: {}; lengths are in metres", misplaced(&layer.mask, bounds)?))
+        if let Some(wrong) = misplaced(&layer.mask, bounds) {
+            return Some(format!("layers[{number}]: {wrong}; lengths are in metres"));
+        }
+        let line = texts(&layer.mask).into_iter().find(|line| shapes().all(|shape| is_cut(line, shape)))?;
+        Some(format!(
+            "layers[{number}]: its text {:?} is {} mm long and reaches beyond the surface, where it is cut; make its \
+             height smaller or move it",
+            line.text,
+            significant(1e3 * line.length_m(), 3)
+        ))
     });
     found.collect()
 }
@@ -98,6 +112,35 @@ fn misplaced(mask: &Mask, bounds: &Aabb) -> Option<String> {
     }
 }
 
+/// The lines of text of a mask that are printed as they are.
+fn texts(mask: &Mask) -> Vec<&LabelLine> {
+    match mask {
+        Mask::Text { decal } => vec![&decal.line],
+        Mask::Product { masks } => masks.iter().flat_map(|mask| texts(mask)).collect(),
+        _ => Vec::new(),
+    }
+}
+
+/// True if an end of a line of text is beside a shape as its reader sees it, or a wrapped line is longer than its
+/// circle.
+fn is_cut(line: &LabelLine, shape: &Shape) -> bool {
+    let length = line.length_m();
+    if let Some(radius) = line.wrap_m {
+        return length > TAU * radius;
+    }
+    let facing = Vec3::from(line.facing).normalize();
+    let up = line.up(&facing);
+    let (sin, cos) = line.turn.sin_cos();
+    let along = cos * up.cross(&facing) + sin * up;
+    // The depth to which the renderer prints a line.
+    let depth = 0.5 * length + line.height_m;
+    let is_beside = |side: f64| {
+        let end = Vec3::from(line.at) + 0.5 * side * length * along;
+        shape.ray(&(end + depth * facing), &-facing, 2.0 * depth).is_none()
+    };
+    is_beside(-1.0) || is_beside(1.0)
+}
+
 /// Lowest and highest coordinate of a box along an axis.
 fn extent(bounds: &Aabb, axis: &Vec3) -> [f64; 2] {
     let (centre, reach) = (bounds.centre().dot(axis), 0.5 * bounds.size().dot(&axis.abs()));
@@ -121,8 +164,7 @@ fn meets(decal: &TextDecal, bounds: &Aabb) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{LabelLine, Typeface, VisualLayer};
-    use softvt_geometry::shape::Shape;
+    use crate::{Typeface, VisualLayer};
     use softvt_physics::contact::Friction;
     use std::sync::Arc;
 
@@ -140,8 +182,12 @@ mod tests {
     }
 
     fn text(at: [f64; 3], wrap_m: Option<f64>) -> Mask {
+        printed("milk", at, wrap_m)
+    }
+
+    fn printed(text: &str, at: [f64; 3], wrap_m: Option<f64>) -> Mask {
         let line = LabelLine {
-            text: "milk".into(),
+            text: text.into(),
             typeface: Typeface::Sans,
             height_m: 0.01,
             weight: 0.1,
@@ -164,7 +210,7 @@ mod tests {
               along its axis; lengths are in metres"
             ]
         );
-        assert_eq!(warnings(text([0.0, 0.5, 0.03], None)), [""; 0], "printed along its direction");
+        assert_eq!(warnings(text([0.0, -0.03, 0.03], None)), [""; 0], "printed along its direction");
         assert_eq!(warnings(text([0.0, 0.0, 3.0], None)).len(), 1);
         assert_eq!(warnings(text([0.5, 0.0, 0.0], Some(0.02))), [""; 0], "wrapped around the axis");
         assert_eq!(warnings(text([0.0, 0.0, 0.3], Some(0.02))).len(), 1);
@@ -177,6 +223,21 @@ mod tests {
         );
         let ball = Arc::new(Shape::Sphere { radius: 0.01 }.translated(Vec3::new(0.0, 0.0, 0.4)));
         assert_eq!(warnings(Mask::Inside { shape: ball, soft_m: 0.0 }).len(), 1);
+    }
+
+    #[test]
+    fn a_text_that_is_longer_than_its_face_is_doubted() {
+        let flat = |text: &str, x| warnings(printed(text, [x, -0.03, 0.0], None));
+        assert_eq!(flat("milk", 0.0), [""; 0], "shorter than 40 mm");
+        assert_eq!(flat("milk", 0.019).len(), 1);
+        let cut = flat("whole milk", 0.0);
+        assert!(
+            cut[0].starts_with("visuals[1].layers[1]: its text \"whole milk\" is ") && cut.len() == 1,
+            "{cut:?}"
+        );
+        assert!(cut[0].contains(" mm long and reaches beyond the surface, where it is cut; "), "{cut:?}");
+        assert_eq!(warnings(printed("whole milk", [0.0; 3], Some(0.02))), [""; 0], "125 mm around");
+        assert_eq!(warnings(printed("whole milk", [0.0; 3], Some(0.005))).len(), 1, "31 mm around");
     }
 
     #[test]

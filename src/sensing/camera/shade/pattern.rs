@@ -366,8 +366,7 @@ fn text_position(decal: &TextDecal, p: &Vec3, n: &V3) -> Option<[f64; 2]> {
         let angle = (facing.x * p.y - facing.y * p.x).atan2(facing.x * p.x + facing.y * p.y);
         return Some([radius * angle, p.z - middle.z]);
     }
-    let head = if facing.z.abs() > 0.999 { Vec3::y() } else { Vec3::z() };
-    let up = (head - facing * facing.dot(&head)).normalize();
+    let up = line.up(&facing);
     let offset = p - middle;
     let depth = 0.5 * decal.coverage().length_m() + line.height_m;
     let is_printed =
