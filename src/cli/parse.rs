@@ -36,6 +36,7 @@ pub(super) fn parse(words: &[String]) -> Result<Option<Command>, CliError> {
         text::eprint_line(short_help(command).trim_end());
         return Err(CliError::input(""));
     }
+    let flag_without_equals = flag_without_equals(&command, words);
     let matches = match command.try_get_matches_from(words) {
         Ok(matches) => matches,
         Err(error) if matches!(error.kind(), ErrorKind::DisplayHelp | ErrorKind::DisplayVersion) => {
@@ -45,7 +46,10 @@ pub(super) fn parse(words: &[String]) -> Result<Option<Command>, CliError> {
             }
             return Ok(None);
         }
-        Err(error) => return Err(in_file(usage_error(&error.to_string()))),
+        Err(error) => {
+            let message = flag_without_equals.unwrap_or_else(|| error.to_string());
+            return Err(in_file(usage_error(&message)));
+        }
     };
     let innermost = innermost(&matches);
     let parsed = match matches.subcommand_name() {
@@ -180,6 +184,19 @@ fn misspelt_command(words: &[String]) -> Option<String> {
     }
 }
 
+/// A message about a value that follows its flag as a word of its own, though only an equals sign gives the flag one.
+fn flag_without_equals(command: &clap::Command, words: &[String]) -> Option<String> {
+    let commands = || std::iter::once(command).chain(command.get_subcommands());
+    words.iter().zip(words.iter().skip(1)).find_map(|(flag, value)| {
+        let is_value = !value.starts_with('-') && !value.ends_with(".lua");
+        let name = flag.strip_prefix("--").filter(|_| is_value)?;
+        let mut flags = commands().flat_map(clap::Command::get_arguments);
+        let arg = flags.find(|arg| arg.get_long() == Some(name) && arg.is_require_equals_set())?;
+        let help = arg.get_help().map(ToString::to_string).unwrap_or_default();
+        Some(format!("{flag} takes its value after an equals sign: {flag}={value}. {help}"))
+    })
+}
+
 /// Finds the script on the command line: the first word that ends in `.lua` and is not the value of another flag.
 fn script_file(words: &[String]) -> Option<&str> {
     let pairs = words.iter().zip(words.iter().skip(1));
@@ -198,6 +215,20 @@ mod tests {
     #[test]
     fn the_definition_of_the_command_line_is_consistent() {
         clap_command().debug_assert();
+    }
+
+    #[test]
+    fn a_value_that_needs_an_equals_sign_is_told_so() {
+        let message = |words: &str| {
+            let words: Vec<String> = words.split(' ').map(str::to_owned).collect();
+            flag_without_equals(&clap_command(), &words)
+        };
+        let told = message("softvt x.lua --video all").unwrap_or_default();
+        let expected = "--video takes its value after an equals sign: --video=all. Render videos of unsafe episodes; =all for";
+        assert!(told.starts_with(expected), "{told}");
+        for words in ["softvt --video x.lua", "softvt x.lua --video --json", "softvt x.lua --threads 2"] {
+            assert_eq!(message(words), None, "{words}");
+        }
     }
 
     #[test]
