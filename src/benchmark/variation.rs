@@ -143,6 +143,25 @@ pub struct VariationRanges {
 }
 
 impl VariationRanges {
+    /// True if every episode has the objects, the light and the cameras of its layout.
+    pub fn changes_nothing(&self) -> bool {
+        let Self {
+            name: _,
+            size,
+            stiffness,
+            density,
+            friction,
+            colour,
+            light,
+            camera_offset_m,
+            camera_rotation_rad,
+            hidden,
+        } = self;
+        [size, stiffness, density, friction, light].iter().all(|range| **range == FactorRange::ONE)
+            && [colour, camera_offset_m, camera_rotation_rad].iter().all(|largest| **largest == 0.0)
+            && hidden.is_none()
+    }
+
     /// Draws the variation of an episode. Each factor has a stream of its own, except stiffness, density and friction,
     /// which are drawn from that of the material. Soft objects are drawn in the order of the scene.
     ///

@@ -216,6 +216,10 @@ impl RunConfig {
         if let Some(file) = &self.vary {
             let (ranges, files) = softvt_script::load_variation(file)
                 .map_err(|error| RunError::from(error).in_setting("vary", ""))?;
+            if ranges.changes_nothing() {
+                let file = file.display();
+                self.notice(format!("warning: --vary {file}: all its factors are 1 and its largest changes 0, so that nothing varies"));
+            }
             loaded.variation_files = files;
             loaded.vary(&ranges).map_err(|error| self.error_of("vary", "", error))?;
         }

@@ -397,3 +397,47 @@ fn scenes_of_later_episodes_are_checked_on_request() {
     let message = project.message(project.run("x.lua").episodes(20).check());
     assert_snapshot!(message, @"x.lua:4: no place (task 0 episode 2)");
 }
+
+#[test]
+fn images_that_show_nothing_and_tiny_budgets_are_doubted() {
+    let of = |at| warnings(&Small { at, ..Small::default() }.project());
+    let blind = of("at = { 0, 0.1 } } scene:add_camera { name = \"tip\", mount = \"hand\", \
+         position = { 0.05, 0, 0 }, look_at = { 0.05, 0, 1 }, up = { 1, 0, 0 }, near = 0.001, far = 0.02 } local _ = {");
+    let expected = "camera tip: its far is 0.02 m, and the tool centre point is 0.115 m away";
+    assert!(blind.contains(expected), "{blind}");
+    let dark = of("at = { 0, 0.1 } } scene.light.strength = 0 scene.light.sky_strength = 0 local _ = {");
+    assert!(dark.contains("scene.light: it is so weak that the images of all cameras are black"), "{dark}");
+    let short = warnings(&Small { task: "budget_steps = 9", ..Small::default() }.project());
+    assert!(short.contains("task 0: budget_steps is 9, 0.45 s; no episode can reach its goal"), "{short}");
+}
+
+#[test]
+fn a_variation_that_changes_nothing_is_doubted() {
+    let project = Small::default().project();
+    let warns = |light: &str| {
+        let one = "{ 1, 1 }";
+        let text = format!(
+            "return softvt.variation {{ name = 'v', size = {one}, stiffness = {one}, density = {one}, \
+             friction = {one}, colour = 0, light = {light}, camera_offset = 0, camera_rotation = 0 }}"
+        );
+        project.write("v.lua", text.as_bytes());
+        let run = project.run("x.lua").with(|config| config.vary = Some(project.path("v.lua")));
+        run.clone().check().expect("valid");
+        run.messages
+            .text()
+            .contains("all its factors are 1 and its largest changes 0, so that nothing varies")
+    };
+    assert!(warns("{ 1, 1 }") && !warns("{ 1, 1.1 }"));
+}
+
+#[test]
+fn a_wrong_name_is_told_of_the_file_that_makes_the_expert_by_a_module() {
+    let expert = "expert = function(arm, scene) arm:wait(1) end";
+    let text = Small::default().text();
+    assert!(text.contains(expert));
+    let module = "return function(spec)\n  local function run(arm) arm:wait(1) end\n  \
+                  return softvt.check_names('mine', run, spec, { object = 'object' })\nend\n";
+    let text = text.replace(expert, "expert = require 'mine' { object = 'cub' }");
+    let refused = refusal(&Project::new(&[("x.lua", &text), ("mine.lua", module)]));
+    assert_snapshot!(refused, @r#"x.lua:12: mine.object: unknown object "cub"; did you mean "cube"?"#);
+}

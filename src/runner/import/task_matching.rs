@@ -124,7 +124,12 @@ fn forced_task<'a>(config: &RunConfig, suites: &'a [Suite]) -> Result<Option<Sui
     }
     match (&found[..], error) {
         ([task], _) => Ok(Some(*task)),
-        ([], Some(error)) => Err(error),
+        ([], Some(error)) if suites.len() == 1 => Err(error),
+        ([], Some(_)) => {
+            let names: Vec<&str> = suites.iter().map(|suite| suite.name.as_str()).collect();
+            let message = format!("none of the suites {} has such a task", names.join(", "));
+            Err(config.error_of("tasks", config.tasks.join(","), message))
+        }
         _ => {
             let message = format!(
                 "matches {} tasks; select the one of the demonstrations, or none to match their instructions",
@@ -224,6 +229,10 @@ fn no_task(config: &RunConfig, suites: &[Suite], file: &ForeignFile, demo: &Fore
         (None, Some(suite)) => format!("it is of the suite {suite}, but does not name its task"),
         (None, None) => "it does not name its task, by an instruction or an index".to_owned(),
     };
+    if file.format == ForeignFormat::Softvt {
+        let fix = "softvt imports its own recordings into their own task, whatever task is selected; name the file of their suite";
+        return refuse(file, demo, format!("{problem}; {fix}"));
+    }
     let list = |suite: &Suite| {
         let tasks = suite.tasks.iter().map(|task| format!("\n  {} {}: {}", suite.name, task.id, task.prompt));
         tasks.collect::<String>()
