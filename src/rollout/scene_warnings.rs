@@ -17,8 +17,8 @@ use softvt_scene::{
 
 /// Warnings about a scene of a task, one line each: materials, soft bodies of few voxels, bodies of several pieces or
 /// off their axis, joints of unlikely numbers, hints with misspelt names, a target that the gripper cannot grasp,
-/// objects outside of the workspace, cameras that do not show what the goal names or the fingers, a scene without light,
-/// and a budget below what the goal takes.
+/// objects outside of the workspace, cameras that do not show what the goal names or the fingers, a scene without
+/// light, and a budget below what the goal takes.
 pub fn scene_warnings(task: &Task, scene: &Scene, cache: &AssetCache) -> BTreeSet<String> {
     let warnings = |asset: &Asset| {
         let name = asset.name.clone();

@@ -102,7 +102,7 @@ end"#
     );
     let overlap = refused("body('cube', 0)\n  world:step()\n  solid('pad', 0.03)");
     assert!(
-        overlap.contains("x.lua:11: ") && overlap.contains("\"cube\" and \"pad\" overlap by"),
+        overlap.contains("x.lua:7: ") && overlap.contains("\"cube\" and \"pad\" overlap by"),
         "{overlap}"
     );
     for to in [0.0, -0.2] {
@@ -110,7 +110,7 @@ end"#
             "body('cube', 0) solid('pad', 0.1):move_to {{ {to}, 0, 0.02 }}\n  world:step()"
         ));
         let expected = "through \"cube\"; move it by at most 20 mm per step";
-        assert!(jump.contains("x.lua:10: ") && jump.contains(expected), "{jump}");
+        assert!(jump.contains("x.lua:9: ") && jump.contains(expected), "{jump}");
     }
     // Away from bodies, and out of contact, a solid may move as far as it likes.
     for free in ["0.5, 0, 0.02", "0, 0.5, 0.5"] {
