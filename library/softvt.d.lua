@@ -581,7 +581,7 @@
 ---@field material integer Material id: index into the asset's visuals, from 0. Expects a whole number in 0..65535.
 ---@field region? softvt.Shape Part of the surface inside of this shape; the whole surface by default.
 
----Adds a soft body.
+---Adds a soft body. A body that overlaps another or a solid by more than 1 mm is an error.
 ---@class softvt.WorldSoft
 ---@field name? string Name in messages. Default "body".
 ---@field shape softvt.Shape Shape.
@@ -925,7 +925,7 @@ function Mask:inverted() end
 ---@class softvt.World
 local World = {}
 
----Adds a soft body.
+---Adds a soft body. A body that overlaps another or a solid by more than 1 mm is an error.
 ---@param spec softvt.WorldSoft
 ---@return softvt.Body
 function World:soft(spec) end
@@ -1010,7 +1010,7 @@ function Body:deformation() end
 ---@return number?
 function Body:stable_strain() end
 
----Returns the compressive strain that `percent` of the volume stays below: 1 − σ_min(F) at the Gauss points, weighted by volume.
+---Returns the compressive strain that `percent` of the volume stays below: 1 − σ_min(F) at the Gauss points, weighted by volume. 95 is usual; a number above 0 and at most 1 is most likely a share, and an error.
 ---@param percent number
 ---@return number
 function Body:strain_percentile(percent) end
@@ -1052,7 +1052,7 @@ function Body:slipping(solid) end
 ---@class softvt.Solid
 local Solid = {}
 
----Prescribes the pose after the next step: position, m, and orientation as axis-angle, rad (none by default).
+---Prescribes the pose after the next step: position, m, and orientation as axis-angle, rad (none by default). To move it into a soft body by more than half of the body's thickness in one step is an error.
 ---@param position number[]
 ---@param axis_angle? number[]
 function Solid:move_to(position, axis_angle) end
@@ -1897,7 +1897,7 @@ function softvt.force_at(sweep, width_mm) end
 ---@return softvt.Instances
 function softvt.instances(suite) end
 
----Has the objects that an expert names checked in every scene in which its task runs, and returns the expert: `return softvt.check_names("nudge", run, spec, { object = "object" })`. The kinds of the fields of `spec` are "object" (one that moves), "place" (an object or a part), "joint" (a part, cabinet.top_drawer) and "value of joint" (a number in the range of the joint that the field `joint` names). Experts in `spec` are checked as well. softvt check reports a wrong name at the line where the expert was made.
+---Has the objects that an expert names checked in every scene in which its task runs, and returns the expert: `return softvt.check_names("nudge", run, spec, { object = "object" })`. The kinds of the fields of `spec` are "object" (one that moves), "place" (an object or a part), "joint" (a part, cabinet.top_drawer) and "value of joint" (a number in the range of the joint that the field `joint` names). Experts in `spec` are checked as well. softvt check reports a wrong name at the line of the file that called the function which makes the expert.
 ---@param label string
 ---@param expert fun(arm: softvt.Arm, scene: softvt.SceneState)
 ---@param spec table
