@@ -70,7 +70,7 @@ pub(crate) struct Stage {
     pub(crate) feed: Arc<Feed>,
     pub(crate) requests: Receiver<Selection>,
     pub(crate) drive: Arc<DriveInput>,
-    /// What pages may select at present.
+    /// Selections that pages offer at present.
     pub(crate) menu: Arc<Mutex<Menu>>,
     pub(crate) files: Versions,
     /// True once the episode that is simulated was replaced by another, or one of its files was saved.

@@ -2,6 +2,7 @@
 
 use serde::Serialize;
 
+use softvt_common::text::AXIS_NAMES;
 use softvt_evaluation::statistics::quantile;
 use softvt_geometry::{Mat3, Vec3};
 
@@ -165,7 +166,7 @@ impl AxisChange {
         let name = |answered: usize| {
             let row = (0..3).find(|row| self.to_base[(*row, answered)] != 0.0).unwrap_or(answered);
             let sign = if self.to_base[(row, answered)] < 0.0 { "−" } else { "" };
-            format!("{sign}{}", ["x", "y", "z"][row])
+            format!("{sign}{}", AXIS_NAMES[row])
         };
         format!("({}, {}, {})", name(0), name(1), name(2))
     }

@@ -8,6 +8,7 @@ use super::{
     position::Evidence,
     sampling::StepSample,
 };
+use softvt_common::text::AXIS_NAMES;
 use softvt_geometry::{Mat3, Quat, Vec3};
 use softvt_robot::rotation;
 
@@ -112,7 +113,7 @@ impl EulerAngles {
     }
 
     fn name(self) -> String {
-        let axes = self.axes.map(|axis| ["x", "y", "z"][axis]).join(", ");
+        let axes = self.axes.map(|axis| AXIS_NAMES[axis]).join(", ");
         let frame = if self.is_intrinsic { "turning" } else { "fixed" };
         let unit = if self.unit == 1.0 { "rad" } else { "degrees" };
         format!("Euler angles about the {frame} axes {axes}, {unit}")

@@ -23,7 +23,10 @@ use crate::{
         memory_budget::{Reservation, reserve},
     },
 };
-use softvt_common::{parallel::lock, text::format_number};
+use softvt_common::{
+    parallel::lock,
+    text::{AXIS_NAMES, format_number},
+};
 use softvt_geometry::{
     Aabb, Quat, Vec3,
     import::{MeshFormat, MeshImportError, MeshImportOptions, import, import_colours},
@@ -221,7 +224,7 @@ impl LuaShape {
             "shape:{method}.mask: its weight is 0 on the whole shape, which reaches from {} to {} m along {}",
             format_number(low),
             format_number(high),
-            ["x", "y", "z"][axis.index()]
+            AXIS_NAMES[axis.index()]
         );
         Err(fail(lua, message))
     }

@@ -16,7 +16,7 @@ use crate::{
         memory_budget::{Reservation, reserve},
     },
 };
-use softvt_common::parallel::lock;
+use softvt_common::{parallel::lock, text::AXIS_NAMES};
 use softvt_scene::{LabelLine, MAX_LETTERS, Mask, Scene, TextDecal, Typeface, Visual, VisualLayer};
 
 /// Lengths of patterns. Finer ones cannot be seen, and their waves exceed the numbers of the renderer.
@@ -69,7 +69,7 @@ fn make_visual(
 
 choice! { Typeface { "sans" => Sans, "mono" => Mono } }
 
-const AXIS: Type = Type::Direction(&["x", "y", "z"], "any length");
+const AXIS: Type = Type::Direction(&AXIS_NAMES, "any length");
 const FACING: Type = Type::Direction(&["+x", "-x", "+y", "-y", "+z", "-z"], "any length");
 
 /// A direction given by the name of an axis or by a vector.
@@ -84,7 +84,7 @@ impl FromChecked for Direction {
         };
         let name = name.to_string_lossy();
         let length = if name.starts_with('-') { -1.0 } else { 1.0 };
-        Ok(Self(["x", "y", "z"].map(|axis| if name.ends_with(axis) { length } else { 0.0 })))
+        Ok(Self(AXIS_NAMES.map(|axis| if name.ends_with(axis) { length } else { 0.0 })))
     }
 }
 

@@ -34,7 +34,7 @@ use softvt_benchmark::{
 use softvt_common::episode_id::EpisodeId;
 use softvt_common::{
     parallel::lock,
-    text::{format_number, unknown_name},
+    text::{AXIS_NAMES, format_number, unknown_name},
 };
 use softvt_geometry::{Aabb, Vec3};
 use softvt_robot::{gripper::MAX_WIDTH, panda};
@@ -401,7 +401,7 @@ fn check_workspace(scene: &Scene) -> Result<(), String> {
             "scene.workspace_min {} is not below scene.workspace_max {} along {}",
             corner(&min),
             corner(&max),
-            ["x", "y", "z"][axis]
+            AXIS_NAMES[axis]
         ));
     }
     let base = scene.base_w.translation.vector;
