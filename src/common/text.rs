@@ -9,9 +9,9 @@ pub const MAX_TEXT_BYTES: usize = 4096;
 pub const AXIS_NAMES: [&str; 3] = ["x", "y", "z"];
 
 /// Formats a number for a message, in decimal, or in scientific notation if it is below 1e-6 or at least 1e9 in
-/// magnitude. Of a number with more than 15 digits, which arithmetic gives and nobody writes, six are kept.
+/// magnitude. Of a number with more than nine digits, which arithmetic gives and hardly anybody writes, six are kept.
 pub fn format_number(x: f64) -> String {
-    const WRITTEN_DIGITS: usize = 15;
+    const WRITTEN_DIGITS: usize = 9;
     let exact = exact_number(x);
     let mantissa = exact.split('e').next().unwrap_or_default();
     let digits = mantissa.trim_start_matches(['-', '0', '.']).chars().filter(char::is_ascii_digit).count();
