@@ -11,7 +11,7 @@ use super::{
     error::CameraError,
     math::{V3, is_finite},
     mesh::{
-        lod::{Lod, NodeWeights, vertex_normals},
+        lod::{Lod, NodeWeights, RelativeNormal, vertex_normals},
         render_mesh::RenderMesh,
     },
     shade::{shading::Illumination, shadow::ShadowMap, tonemap::ToneMapper},
@@ -279,7 +279,11 @@ impl PosedMesh {
             p
         };
         let positions: Vec<V3> = lod.embedding.iter().map(position).collect();
-        let normals = vertex_normals(&positions, &lod.triangles);
+        let mut normals = vertex_normals(&positions, &lod.triangles);
+        if !lod.relative_normals.is_empty() {
+            let resolve = |(v, relative): (usize, &RelativeNormal)| relative.resolve(v, &positions, &normals);
+            normals = lod.relative_normals.iter().enumerate().map(resolve).collect();
+        }
         let colour = |vertex: &NodeWeights| {
             let weighted = vertex.nodes.iter().zip(&vertex.weights);
             weighted.map(|(&node, weight)| V3::from(colours[node as usize]) * *weight).sum()

@@ -36,7 +36,7 @@ impl RenderMesh {
     /// # Errors
     /// The level cannot be built.
     pub fn display_mesh(&self, pixel: f32) -> Result<DisplayMesh, CameraError> {
-        let lod = self.level(self.coarsest_where(|lod| lod.is_fine_enough(pixel))?)?;
+        let lod = self.full_level(pixel)?;
         let roughness = lod.materials.iter().map(|material| material[3]).sum::<f32>();
         Ok(DisplayMesh {
             positions: lod.positions.iter().map(|p| (*p).into()).collect(),

@@ -56,6 +56,9 @@ pub(crate) struct Lod {
     pub(crate) smoothing_groups: Vec<u32>,
     /// Attachment of each vertex to a soft body; empty for rigid objects.
     pub(crate) embedding: Vec<NodeWeights>,
+    /// Normal of each vertex relative to its triangles, from which the normals of a soft body follow when it deforms;
+    /// empty where they are those of the triangles.
+    pub(crate) relative_normals: Vec<RelativeNormal>,
     /// Mean length of the edges, m.
     pub(crate) vertex_spacing: f32,
     /// True if the material is the same everywhere, or textured.
@@ -72,6 +75,54 @@ impl Lod {
         self.vertex_spacing <= MAX_EDGE_PIXELS * pixel
             || self.is_uniform && self.geometric_error.max(self.missing_relief) <= MAX_ERROR_PIXELS * pixel
     }
+}
+
+/// A vertex normal relative to the normal of the adjacent triangles, which differs from that of the surface where
+/// triangles are of unequal size.
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
+pub(crate) struct RelativeNormal {
+    /// A vertex of an adjacent triangle; the second axis of the frame points towards it.
+    neighbour: u32,
+    /// Components along the normal of the triangles and both axes of the frame in their plane.
+    components: [f32; 3],
+}
+
+impl RelativeNormal {
+    /// The normals of the vertices relative to `triangle_normals`, the [`vertex_normals`] at these positions.
+    pub(crate) fn of_vertices(
+        positions: &[V3],
+        triangles: &[[u32; 3]],
+        normals: &[V3],
+        triangle_normals: &[V3],
+    ) -> Vec<Self> {
+        let mut neighbours: Vec<u32> = (0..).take(positions.len()).collect();
+        for [a, b, c] in triangles {
+            for (v, next) in [(a, b), (b, c), (c, a)] {
+                neighbours[*v as usize] = *next;
+            }
+        }
+        let relative = |(v, &neighbour): (usize, &u32)| {
+            let edge = positions[neighbour as usize] - positions[v];
+            let components = frame(&triangle_normals[v], &edge).map(|axis| axis.dot(&normals[v]));
+            Self { neighbour, components }
+        };
+        neighbours.iter().enumerate().map(relative).collect()
+    }
+
+    /// The normal of vertex `v` where the vertices are at these positions.
+    pub(crate) fn resolve(&self, v: usize, positions: &[V3], triangle_normals: &[V3]) -> V3 {
+        let edge = positions[self.neighbour as usize] - positions[v];
+        let [n, t, b] = frame(&triangle_normals[v], &edge);
+        n * self.components[0] + t * self.components[1] + b * self.components[2]
+    }
+}
+
+/// A right-handed orthonormal frame of first axis `n`, a unit vector, whose second axis is `edge` as far as it is normal
+/// to `n`. Both other axes vanish if nothing of it is.
+fn frame(n: &V3, edge: &V3) -> [V3; 3] {
+    let t = edge - n * edge.dot(n);
+    let t = t.try_normalize(0.0).unwrap_or_else(V3::zeros);
+    [*n, t, n.cross(&t)]
 }
 
 /// A mesh whose vertices are duplicated at creases: one vertex for each smooth group of triangles around each original
@@ -245,4 +296,35 @@ fn blend_visuals(
         }
     }
     blends
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::camera::mesh::simplify::simplify;
+    use softvt_geometry::surface_mesh::SurfaceMesh;
+
+    #[test]
+    fn normals_of_a_simplified_ball_turn_with_it_and_stay_those_of_the_ball() {
+        let mesh = SurfaceMesh::from_shape(&Shape::Sphere { radius: 0.05 }, 2e-3).mesh;
+        let fine = bake_vertices(&mesh, &vec![0; mesh.triangles.len()], &[Visual::default()], 2e-3, None);
+        let lod = simplify(&fine, 2e-4, f32::MAX);
+        let of_triangles = vertex_normals(&lod.positions, &lod.triangles);
+        let relative =
+            RelativeNormal::of_vertices(&lod.positions, &lod.triangles, &lod.normals, &of_triangles);
+        let turn = nalgebra::Rotation3::from_euler_angles(0.3_f32, -0.8, 2.0);
+        let turned: Vec<V3> = lod.positions.iter().map(|p| turn * p).collect();
+        let of_turned = vertex_normals(&turned, &lod.triangles);
+        let (mut worst, mut worst_of_triangles) = (1.0_f32, 1.0_f32);
+        for (v, (relative, p)) in relative.iter().zip(&turned).enumerate() {
+            let radial = p.normalize();
+            worst = worst.min(relative.resolve(v, &turned, &of_turned).dot(&radial));
+            worst_of_triangles = worst_of_triangles.min(of_turned[v].dot(&radial));
+        }
+        assert!(worst > 0.9995, "{worst}");
+        assert!(
+            worst_of_triangles < worst,
+            "those of the triangles alone are no better: {worst_of_triangles}"
+        );
+    }
 }

@@ -6,7 +6,7 @@ use std::{
 };
 
 use super::{
-    lod::{Lod, NodeWeights, bake_vertices, extent},
+    lod::{Lod, NodeWeights, RelativeNormal, bake_vertices, extent, vertex_normals},
     primitive::{append_visible, flat_faces, primitive_mesh, transform},
     simplify::simplify,
     texture::{
@@ -28,8 +28,11 @@ use softvt_scene::{Visual, VisualLayer};
 
 /// Cells along the longest edge of a shape, per level of detail.
 const CELLS: [f64; 5] = [64.0, 40.0, 26.0, 16.0, 10.0];
-/// Tolerance of the simplification of rigid shapes, in vertex spacings.
-const SIMPLIFY_TOLERANCE: f32 = 0.025;
+/// Tolerance of the simplification of shapes, in vertex spacings.
+const SIMPLIFY_TOLERANCE: f32 = 0.05;
+/// Maximum edge of the triangles of a simplified soft shape, in voxels of its body: straight edges follow its
+/// deformation.
+const MAX_SOFT_EDGE: f64 = 1.0 / 3.0;
 /// Maximum edge of triangles with patterns, in longest extents of the mesh.
 const MAX_PATTERN_EDGE: f64 = 1.0 / 48.0;
 /// Maximum number of triangles that subdivision creates.
@@ -61,9 +64,14 @@ const HIDDEN_DEPTH: f64 = 1.5e-3;
 /// Coarser levels of detail are drawn where they look the same; those of shapes are built on first use.
 #[derive(Clone, Debug)]
 pub struct RenderMesh {
-    /// From fine to coarse; at least one.
-    levels: Vec<Arc<LazyLevel>>,
+    levels: LevelChain,
+    /// The levels of a soft shape before simplification, for viewers that show the colours of vertices.
+    full_levels: Option<LevelChain>,
 }
+
+/// Levels of detail from fine to coarse; at least one.
+#[derive(Clone, Debug)]
+pub(crate) struct LevelChain(Vec<Arc<LazyLevel>>);
 
 /// A level of detail that is built on first use: finer ones take longer and are seen from nearby only.
 type LazyLevel = LazyLock<
@@ -152,12 +160,15 @@ impl RenderMesh {
     /// Builds the level that casts shadows, which every image needs, and leaves finer ones for later.
     fn with_lazy_levels(surface: ShapeSurface) -> Result<Self, CameraError> {
         let cells = surface.cells();
-        let surface = Arc::new(surface);
-        let level = |(index, cells): (usize, f64)| {
-            let surface = surface.clone();
-            lazy_level(move || surface.level(cells, index == 0))
+        let (is_soft, surface) = (surface.voxels.is_some(), Arc::new(surface));
+        let chain = |is_simplified: bool| {
+            let level = |(index, &cells): (usize, &f64)| {
+                let surface = surface.clone();
+                lazy_level(move || surface.level(cells, index == 0, is_simplified))
+            };
+            LevelChain(cells.iter().enumerate().map(level).collect())
         };
-        let mesh = Self { levels: cells.into_iter().enumerate().map(level).collect() };
+        let mesh = Self { levels: chain(true), full_levels: is_soft.then(|| chain(false)) };
         mesh.caster()?;
         Ok(mesh)
     }
@@ -173,17 +184,17 @@ impl RenderMesh {
             LazyLock::force(&level);
             level
         });
-        Self { levels: levels.collect() }
+        Self { levels: LevelChain(levels.collect()), full_levels: None }
     }
 
     /// Number of levels.
     pub(crate) fn level_count(&self) -> usize {
-        self.levels.len()
+        self.levels.0.len()
     }
 
     /// A level of detail; 0 is the finest.
     pub(crate) fn level(&self, index: usize) -> Result<&Lod, CameraError> {
-        self.levels[index].as_ref().as_ref().map(|level| &level.lod).map_err(Clone::clone)
+        self.levels.get(index)
     }
 
     /// Index of the level that casts shadows and stands for the object where its extent matters only.
@@ -193,12 +204,14 @@ impl RenderMesh {
 
     /// Index of the coarsest level that is good enough, or of the finest one.
     pub(crate) fn coarsest_where(&self, is_good: impl Fn(&Lod) -> bool) -> Result<usize, CameraError> {
-        for index in (1..self.levels.len()).rev() {
-            if is_good(self.level(index)?) {
-                return Ok(index);
-            }
-        }
-        Ok(0)
+        self.levels.coarsest_where(is_good)
+    }
+
+    /// The coarsest level that looks like the finest one where a pixel covers `pixel` metres, with small triangles where
+    /// an object has textures or deforms.
+    pub(crate) fn full_level(&self, pixel: f32) -> Result<&Lod, CameraError> {
+        let levels = self.full_levels.as_ref().unwrap_or(&self.levels);
+        levels.get(levels.coarsest_where(|lod| lod.is_fine_enough(pixel))?)
     }
 
     /// Builds the mesh of triangles, closed or not, which are visible from their counter-clockwise side.
@@ -256,9 +269,24 @@ impl RenderMesh {
         // Solids share no vertices and are uniform each, so their materials do not limit simplification.
         finer.is_uniform = true;
         Ok(Self::from_levels(LOD_ERRORS.map(|geometric_error| {
-            finer = Lod { geometric_error, ..simplify(&finer, geometric_error) };
+            finer = Lod { geometric_error, ..simplify(&finer, geometric_error, f32::MAX) };
             finer.clone()
         })))
+    }
+}
+
+impl LevelChain {
+    fn get(&self, index: usize) -> Result<&Lod, CameraError> {
+        self.0[index].as_ref().as_ref().map(|level| &level.lod).map_err(Clone::clone)
+    }
+
+    fn coarsest_where(&self, is_good: impl Fn(&Lod) -> bool) -> Result<usize, CameraError> {
+        for index in (1..self.0.len()).rev() {
+            if is_good(self.get(index)?) {
+                return Ok(index);
+            }
+        }
+        Ok(0)
     }
 }
 
@@ -300,9 +328,10 @@ impl ShapeSurface {
     }
 
     /// The level of detail with `cells` along the longest edge.
-    fn level(&self, cells: f64, is_finest: bool) -> Result<KeptLevel, CameraError> {
-        let inputs = (&self.key, cells, is_finest);
-        let mut lod = self.cache.get("level", &inputs, || self.build_level(cells, is_finest))?;
+    fn level(&self, cells: f64, is_finest: bool, is_simplified: bool) -> Result<KeptLevel, CameraError> {
+        let inputs = (&self.key, cells, is_finest, is_simplified);
+        let mut lod =
+            self.cache.get("level", &inputs, || self.build_level(cells, is_finest, is_simplified))?;
         if self.is_textured {
             parameterize(&mut lod, &self.material);
         }
@@ -310,7 +339,7 @@ impl ShapeSurface {
     }
 
     /// Builds a level of detail without its textures.
-    fn build_level(&self, cells: f64, is_finest: bool) -> Result<Lod, CameraError> {
+    fn build_level(&self, cells: f64, is_finest: bool, is_simplified: bool) -> Result<Lod, CameraError> {
         let SurfaceMaterial { shape, visuals } = &*self.material;
         let cell = shape.bounds().size().max() / cells;
         let mesh = self.triangulate(cell);
@@ -325,8 +354,10 @@ impl ShapeSurface {
             lod.geometric_error = geometric_error(&mesh, shape);
             lod.missing_relief = self.relief();
         }
-        if self.voxels.is_none() {
-            lod = simplify(&lod, SIMPLIFY_TOLERANCE * lod.vertex_spacing);
+        if is_simplified {
+            let max_edge =
+                self.voxels.as_ref().map_or(f32::MAX, |voxels| (MAX_SOFT_EDGE * voxels.edge) as f32);
+            lod = simplify(&lod, SIMPLIFY_TOLERANCE * lod.vertex_spacing, max_edge);
         }
         self.embed(lod)
     }
@@ -384,7 +415,10 @@ impl ShapeSurface {
             name: self.name.clone(),
             reason: "its surface lies outside of its voxel mesh; build both from one shape".to_owned(),
         };
-        Ok(Lod { embedding: embedding.ok_or_else(outside)?, ..lod })
+        let of_triangles = vertex_normals(&lod.positions, &lod.triangles);
+        let relative_normals =
+            RelativeNormal::of_vertices(&lod.positions, &lod.triangles, &lod.normals, &of_triangles);
+        Ok(Lod { embedding: embedding.ok_or_else(outside)?, relative_normals, ..lod })
     }
 }
 

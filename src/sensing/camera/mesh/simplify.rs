@@ -111,19 +111,22 @@ struct Simplifier<'a, const D: usize> {
     queue: BinaryHeap<Reverse<Collapse>>,
     /// Collapses that cost more are not queued.
     max_cost: f64,
+    /// Square of the length up to which edges may grow, m².
+    max_edge2: f32,
 }
 
-/// Returns a level of detail with as few triangles as look the same within `tolerance`, m.
-pub(crate) fn simplify(lod: &Lod, tolerance: f32) -> Lod {
+/// Returns a level of detail with as few triangles as look the same within `tolerance`. No edge grows beyond
+/// `max_edge`. Both m.
+pub(crate) fn simplify(lod: &Lod, tolerance: f32, max_edge: f32) -> Lod {
     if lod.is_uniform {
-        Simplifier::<UNIFORM_DIMENSIONS>::new(lod, f64::from(tolerance)).run(tolerance)
+        Simplifier::<UNIFORM_DIMENSIONS>::new(lod, f64::from(tolerance), max_edge).run(tolerance)
     } else {
-        Simplifier::<ALL_DIMENSIONS>::new(lod, f64::from(tolerance)).run(tolerance)
+        Simplifier::<ALL_DIMENSIONS>::new(lod, f64::from(tolerance), max_edge).run(tolerance)
     }
 }
 
 impl<'a, const D: usize> Simplifier<'a, D> {
-    fn new(lod: &'a Lod, tolerance: f64) -> Self {
+    fn new(lod: &'a Lod, tolerance: f64, max_edge: f32) -> Self {
         let point = |v: usize| {
             let (p, n, material) = (lod.positions[v], lod.normals[v], &lod.materials[v]);
             let mut x = [0.0; D];
@@ -149,6 +152,7 @@ impl<'a, const D: usize> Simplifier<'a, D> {
             revisions: vec![0; count],
             queue: BinaryHeap::new(),
             max_cost: MAX_COST * tolerance * tolerance,
+            max_edge2: max_edge * max_edge,
         };
         let area = |t: &[u32; 3]| f64::from(simplifier.area_normal(t).norm());
         let mean = lod.triangles.iter().map(area).sum::<f64>() / lod.triangles.len().max(1) as f64;
@@ -219,7 +223,8 @@ impl<'a, const D: usize> Simplifier<'a, D> {
         }
     }
 
-    /// True if the surface stays a manifold and no triangle flips or degenerates when `from` moves onto `to`.
+    /// True if the surface stays a manifold and no triangle flips, degenerates or grows too long when `from` moves onto
+    /// `to`.
     fn is_valid(&self, from: u32, to: u32) -> bool {
         let (mut own, mut other) = (self.neighbours(from), self.neighbours(to));
         own.dedup();
@@ -237,6 +242,7 @@ impl<'a, const D: usize> Simplifier<'a, D> {
             let longest2 = (b - a).norm_squared().max((c - b).norm_squared()).max((a - c).norm_squared());
             before.dot(&after) > MIN_TURN_COSINE * before.norm() * after.norm()
                 && after.norm() > MIN_ASPECT * longest2
+                && longest2 <= self.max_edge2
         })
     }
 
@@ -298,7 +304,7 @@ mod tests {
     fn a_simplified_ball_stays_closed_and_within_the_tolerance() {
         let (radius, tolerance) = (0.05, 2e-4);
         let fine = fine_level(&Shape::Sphere { radius }, 2e-3, Visual::default());
-        let coarse = simplify(&fine, tolerance as f32);
+        let coarse = simplify(&fine, tolerance as f32, f32::MAX);
         assert!(5 * coarse.triangles.len() < fine.triangles.len(), "{}", coarse.triangles.len());
         let mut balance = std::collections::BTreeMap::new();
         for t in &coarse.triangles {
@@ -314,12 +320,28 @@ mod tests {
     }
 
     #[test]
+    fn edges_of_a_flat_face_grow_up_to_the_limit() {
+        let fine = fine_level(&Shape::Box { half: [0.04; 3].into() }, 2e-3, Visual::default());
+        let coarse = simplify(&fine, 2e-4, 0.01);
+        let edges = || {
+            coarse
+                .triangles
+                .iter()
+                .flat_map(|&[a, b, c]| [(a, b), (b, c), (c, a)])
+                .map(|(a, b)| (coarse.positions[a as usize] - coarse.positions[b as usize]).norm())
+        };
+        let longest = edges().fold(0.0, f32::max);
+        assert!((0.006..=0.01).contains(&longest), "{longest}");
+        assert!(4 * coarse.triangles.len() < fine.triangles.len(), "{}", coarse.triangles.len());
+    }
+
+    #[test]
     fn triangles_are_kept_at_the_border_of_a_pattern_and_removed_elsewhere() {
         let shape = Shape::Cylinder { radius: 0.08, half_height: 0.01 };
         let spot = Mask::Inside { shape: Shape::Sphere { radius: 0.03 }.into(), soft_m: 0.004 };
         let dark = VisualLayer { mask: spot, albedo: [0.02; 3], roughness: 0.5, opacity: 1.0, relief_m: 0.0 };
         let fine = fine_level(&shape, 3e-3, Visual::plain([0.8; 3], 0.5, 0.0).with(dark));
-        let coarse = simplify(&fine, 2e-4);
+        let coarse = simplify(&fine, 2e-4, f32::MAX);
         let count_in_ring = |lod: &Lod, from: f32, to: f32| {
             let is_in_ring = |p: &&V3| p.z > 0.009 && (from..to).contains(&p.xy().norm());
             lod.positions.iter().filter(is_in_ring).count()
