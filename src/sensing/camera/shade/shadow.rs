@@ -14,18 +14,20 @@ use softvt_geometry::basis_from_reference;
 use softvt_scene::Lighting;
 
 /// Edge of the part of the map in which points can be shaded, texels.
-const INNER: usize = 768;
+const INNER: usize = 512;
 /// Border around it, texels, which the filter reads.
 const MARGIN: usize = 16;
 /// Edge of the whole map, texels.
 const EDGE: usize = INNER + 2 * MARGIN;
 /// Edge of the tiles that store ranges of heights, texels.
 const TILE: usize = 1 << TILE_BITS;
-const TILE_BITS: i32 = 3;
+const TILE_BITS: i32 = 2;
 /// Tiles along an edge of the map.
 const TILES: usize = EDGE / TILE;
-/// Tiles on each side that a range includes: the reach of the filter.
-const RANGE_MARGIN: usize = 1;
+/// Tiles on each side that a range includes: the reach of the widest filter.
+const MARGIN_TILES: usize = 2;
+/// Largest radius of filters for which the ranges with one tile on each side suffice, texels.
+const NEAR_RADIUS: f32 = TILE as f32;
 /// Depth bias, m: casters are drawn with coarser meshes than the receivers of their shadows.
 const DEPTH_BIAS: f32 = 2e-3;
 /// Maximum error of interpolated normals, rad. Heights above a surface that this error explains are the surface itself.
@@ -56,20 +58,37 @@ const MIN_ELEVATION_SINE: f32 = 0.15;
 /// Height of empty texels, m.
 const EMPTY: f32 = -1e9;
 
-/// A range of heights, m.
+/// Heights around a point, relative to it and above level ground, m.
 #[derive(Clone, Copy, Debug)]
 struct HeightRange {
     min: f32,
     max: f32,
+    /// The highest within [`NEAR_RADIUS`].
+    near_max: f32,
 }
 
-impl HeightRange {
-    const EMPTY: Self = Self { min: EMPTY, max: EMPTY };
-    /// The neutral element of [`union`](Self::union).
-    const NEUTRAL: Self = Self { min: f32::MAX, max: EMPTY };
+/// Heights above level ground in and around each tile of a map, m.
+#[derive(Clone, Debug)]
+struct TileRanges {
+    min: Vec<f32>,
+    max: Vec<f32>,
+    near_max: Vec<f32>,
+}
 
-    fn union(self, other: &Self) -> Self {
-        Self { min: self.min.min(other.min), max: self.max.max(other.max) }
+impl TileRanges {
+    fn empty() -> Self {
+        let plane = || vec![EMPTY; TILES * TILES];
+        Self { min: plane(), max: plane(), near_max: plane() }
+    }
+
+    fn clear(&mut self) {
+        [&mut self.min, &mut self.max, &mut self.near_max].into_iter().for_each(|plane| plane.fill(EMPTY));
+    }
+
+    /// The range around a point of tile `index` that is `own` above level ground.
+    fn around(&self, index: usize, own: f32) -> HeightRange {
+        let [min, max, near_max] = [&self.min, &self.max, &self.near_max].map(|plane| plane[index] - own);
+        HeightRange { min, max, near_max }
     }
 }
 
@@ -88,8 +107,7 @@ pub(crate) struct ShadowMap {
     /// also higher above level ground, whereas level ground never rises above itself.
     ground_slope: [f32; 2],
     texels: HeightBuffer,
-    /// Heights above level ground in and around each tile.
-    ranges: Vec<HeightRange>,
+    ranges: TileRanges,
 }
 
 /// Eight points in the frame of a shadow map.
@@ -126,7 +144,7 @@ impl ShadowMap {
             texels_per_metre,
             tangent: lighting.key.softness_rad.tan() as f32,
             texels: HeightBuffer::new(EDGE, EMPTY),
-            ranges: vec![HeightRange::EMPTY; TILES * TILES],
+            ranges: TileRanges::empty(),
         }
     }
 
@@ -168,44 +186,38 @@ impl ShadowMap {
 
     /// Computes the ranges of heights.
     fn update_ranges(&mut self) {
-        self.ranges.fill(HeightRange::EMPTY);
+        self.ranges.clear();
         let ([from, to], [first, last]) = (self.texels.drawn_rows, self.texels.drawn_columns);
         if from >= to {
             return;
         }
-        let mut tile_ranges = vec![HeightRange::EMPTY; TILES * TILES];
+        let [mut lowest, mut highest] = [0, 1].map(|_| vec![EMPTY; TILES * TILES]);
         let stride = self.texels.stride();
+        const TILES_PER_CHUNK: usize = LANES / TILE;
         for row in from / TILE..to.div_ceil(TILE) {
-            for column in first / TILE..last.div_ceil(TILE) {
+            for chunk in first / LANES..last.div_ceil(LANES) {
                 let (mut low, mut high) = (f32x8::splat(f32::MAX), f32x8::splat(EMPTY));
                 for y in row * TILE..(row + 1) * TILE {
-                    let at = y * stride + column * TILE;
-                    let Some(texels) = self.texels.heights[at..].first_chunk::<TILE>() else { continue };
-                    let u = LANE_INDEX + f32x8::splat((column * TILE) as f32 + 0.5);
+                    let at = y * stride + chunk * LANES;
+                    let Some(texels) = self.texels.heights[at..].first_chunk::<LANES>() else { continue };
+                    let u = LANE_INDEX + f32x8::splat((chunk * LANES) as f32 + 0.5);
                     let ground = u * f32x8::splat(self.ground_slope[0])
                         + f32x8::splat(self.ground_slope[1] * (y as f32 + 0.5));
                     let above_ground = f32x8::new(*texels) - ground;
                     (low, high) = (low.fast_min(above_ground), high.fast_max(above_ground));
                 }
-                let min = low.to_array().into_iter().fold(f32::MAX, f32::min);
-                let max = high.to_array().into_iter().fold(EMPTY, f32::max);
-                tile_ranges[row * TILES + column] = HeightRange { min, max };
+                let (low, high) = (low.to_array(), high.to_array());
+                for (tile, lanes) in (0..LANES).step_by(TILE).enumerate() {
+                    let at = row * TILES + chunk * TILES_PER_CHUNK + tile;
+                    lowest[at] = low[lanes..lanes + TILE].iter().copied().fold(f32::MAX, lower);
+                    highest[at] = high[lanes..lanes + TILE].iter().copied().fold(EMPTY, higher);
+                }
             }
         }
-        // Dilate by the reach of the filter: along v, then along u.
-        let around = |i: usize| i.saturating_sub(RANGE_MARGIN)..(i + RANGE_MARGIN + 1).min(TILES);
-        let rows = (from / TILE).saturating_sub(RANGE_MARGIN)..(to.div_ceil(TILE) + RANGE_MARGIN).min(TILES);
-        for y in rows {
-            let mut columns = [HeightRange::NEUTRAL; TILES];
-            for row in around(y) {
-                let line = &tile_ranges[row * TILES..(row + 1) * TILES];
-                columns.iter_mut().zip(line).for_each(|(all, own)| *all = all.union(own));
-            }
-            for x in 0..TILES {
-                let union = columns[around(x)].iter().fold(HeightRange::NEUTRAL, HeightRange::union);
-                self.ranges[y * TILES + x] = union;
-            }
-        }
+        let rows = (from / TILE).saturating_sub(MARGIN_TILES)..(to.div_ceil(TILE) + MARGIN_TILES).min(TILES);
+        dilate::<MARGIN_TILES>(&lowest, rows.clone(), lower, &mut self.ranges.min);
+        dilate::<MARGIN_TILES>(&highest, rows.clone(), higher, &mut self.ranges.max);
+        dilate::<1>(&highest, rows, higher, &mut self.ranges.near_max);
     }
 
     /// True if a shadow may fall within a box in the frame of the map: lowest and highest u, v (texels) and height
@@ -214,8 +226,8 @@ impl ShadowMap {
         let tile = |x: f32| (x.max(0.0) as usize / TILE).min(TILES - 1);
         let columns = tile(low.x)..tile(high.x) + 1;
         (tile(low.y)..tile(high.y) + 1).any(|y| {
-            let line = self.ranges[y * TILES..].get(columns.clone()).unwrap_or_default();
-            line.iter().any(|range| range.max > low.z + DEPTH_BIAS)
+            let line = self.ranges.max[y * TILES..].get(columns.clone()).unwrap_or_default();
+            line.iter().any(|max| *max > low.z + DEPTH_BIAS)
         })
     }
 
@@ -238,20 +250,20 @@ impl ShadowMap {
             (x.fast_max(f32x8::ZERO).fast_min(f32x8::splat((EDGE - 1) as f32))).fast_trunc_int() >> TILE_BITS
         };
         let tiles = (tile(at.v) * i32x8::splat(TILES as i32) + tile(at.u)).to_array();
-        let ranges = tiles.map(|i| self.ranges[i as usize % (TILES * TILES)]);
-        let max = f32x8::new(ranges.map(|range| range.max));
+        let tiles = tiles.map(|i| (i as usize).min(TILES * TILES - 1));
+        let max = f32x8::new(tiles.map(|i| self.ranges.max[i]));
         let occluded = max.simd_gt(at.height_above_ground + f32x8::splat(DEPTH_BIAS)).to_bitmask() & inside;
-        if occluded == 0 { f32x8::ONE } else { self.filtered_visibility(at, n, occluded, &ranges) }
+        if occluded == 0 { f32x8::ONE } else { self.filtered_visibility(at, n, occluded, &tiles) }
     }
 
-    /// Visible fractions at the points of the bit mask `occluded`, which have something higher in their `ranges`.
+    /// Visible fractions at the points of the bit mask `occluded`, which have something higher around their `tiles`.
     #[inline(never)]
     fn filtered_visibility(
         &self,
         at: &LightSpacePoints,
         n: &Vec3x8,
         occluded: u32,
-        ranges: &[HeightRange; LANES],
+        tiles: &[usize; LANES],
     ) -> f32x8 {
         let component = |axis: usize| n.dot(Vec3x8::splat(&self.axes[axis]));
         let inverse_cosine = f32x8::ONE / component(2).fast_max(f32x8::splat(MIN_COSINE));
@@ -274,8 +286,7 @@ impl ShadowMap {
                 bias: bias[i],
                 cone: self.tangent * self.texels_per_metre,
             };
-            let HeightRange { min, max } = ranges[i];
-            receiver.visibility(HeightRange { min: min - own_height[i], max: max - own_height[i] })
+            receiver.visibility(self.ranges.around(tiles[i], own_height[i]))
         };
         let run_length = if occluded == 0xFF { run_length(at, n, slopes.map(|s| s[0])) } else { f32::MAX };
         if run_length > UNIFORM_RUN {
@@ -291,6 +302,45 @@ impl ShadowMap {
             f32x8::new([a, filter(1), b, filter(3), filter(4), c, filter(6), d])
         } else {
             interpolate_run(nodes)
+        }
+    }
+}
+
+/// The lower of two numbers: one instruction, unlike `f32::min`.
+fn lower(a: f32, b: f32) -> f32 {
+    if b < a { b } else { a }
+}
+
+/// The higher of two numbers.
+fn higher(a: f32, b: f32) -> f32 {
+    if b > a { b } else { a }
+}
+
+/// Writes the extreme value of the tiles around each tile, up to `REACH` away, for some rows. `extreme` is the lower or
+/// the higher of two.
+fn dilate<const REACH: usize>(
+    tiles: &[f32],
+    rows: std::ops::Range<usize>,
+    extreme: impl Fn(f32, f32) -> f32,
+    dilated: &mut [f32],
+) {
+    for y in rows {
+        // Along v, then along u, where the values at both ends are repeated.
+        let mut columns = [tiles[y * TILES]; TILES + 2 * MARGIN_TILES];
+        let own = REACH..REACH + TILES;
+        columns[own.clone()].copy_from_slice(&tiles[y * TILES..(y + 1) * TILES]);
+        for row in y.saturating_sub(REACH)..(y + REACH + 1).min(TILES) {
+            let line = &tiles[row * TILES..(row + 1) * TILES];
+            columns[own.clone()].iter_mut().zip(line).for_each(|(all, other)| *all = extreme(*all, *other));
+        }
+        let (first, last) = (columns[own.start], columns[own.end - 1]);
+        columns[..own.start].fill(first);
+        columns[own.end..].fill(last);
+        let line = &mut dilated[y * TILES..(y + 1) * TILES];
+        line.copy_from_slice(&columns[..TILES]);
+        for shift in 1..=2 * REACH {
+            let shifted = &columns[shift..shift + TILES];
+            line.iter_mut().zip(shifted).for_each(|(all, other)| *all = extreme(*all, *other));
         }
     }
 }
@@ -355,7 +405,7 @@ struct FilterSums {
 }
 
 impl PenumbraFilter<'_> {
-    /// Visible fraction of the light; `range` are the heights around the point, relative to it and to level ground.
+    /// Visible fraction of the light; `range` are the heights around the point.
     fn visibility(&self, range: HeightRange) -> f32 {
         let both_axes = |of: fn(&Self, usize) -> f32| of(self, 0) + of(self, 1);
         let steepest = both_axes(|f, axis| f.slope[axis].abs() + f.map.ground_slope[axis].abs());
@@ -363,8 +413,16 @@ impl PenumbraFilter<'_> {
             return 0.0;
         }
         let deviation = both_axes(|f, axis| (f.map.ground_slope[axis] - f.clamped_slope[axis]).abs());
-        let search_radius =
-            (MIN_RADIUS + (range.max + deviation * MAX_RADIUS) * self.cone).clamp(MIN_RADIUS, MAX_RADIUS);
+        let radius_below = |height: f32| {
+            (MIN_RADIUS + (height + deviation * MAX_RADIUS) * self.cone).clamp(MIN_RADIUS, MAX_RADIUS)
+        };
+        let mut search_radius = radius_below(range.max);
+        if search_radius <= NEAR_RADIUS {
+            if range.near_max <= DEPTH_BIAS {
+                return 1.0;
+            }
+            search_radius = radius_below(range.near_max);
+        }
         let search = match search_radius {
             ..=MAX_RADIUS_ONE_VECTOR => self.sums::<1, 1, true>(search_radius),
             _ => self.sums::<2, 2, true>(search_radius),
@@ -390,8 +448,9 @@ impl PenumbraFilter<'_> {
     #[inline(always)]
     fn sums<const CHUNKS: usize, const STEP: usize, const SEARCH: bool>(&self, radius: f32) -> FilterSums {
         let [u, v, height] = self.position;
-        let first = (u - radius) as usize;
-        let (from, to) = ((v - radius) as usize, (v + radius) as usize + 1);
+        // Conversions by way of `i32` take a few instructions less.
+        let first = (u - radius) as i32 as usize;
+        let (from, to) = ((v - radius) as i32 as usize, (v + radius) as i32 as usize + 1);
         let inverse2 = 1.0 / (radius * radius);
         let du: [f32x8; CHUNKS] =
             std::array::from_fn(|c| LANE_INDEX + f32x8::splat((first + c * LANES) as f32 + 0.5 - u));
@@ -405,14 +464,19 @@ impl PenumbraFilter<'_> {
         let max_reach = f32x8::splat(if SEARCH { radius } else { f32::MAX });
         let (mut lit, mut occluded, mut occluder_height) = (f32x8::ZERO, f32x8::ZERO, f32x8::ZERO);
         let stride = self.map.texels.stride();
-        for row in (from.div_ceil(STEP) * STEP..to).step_by(STEP) {
+        // Counters and ranges of texels in place of iterators, which take as long as the sums.
+        let mut row = from.next_multiple_of(STEP);
+        while row < to {
             let dv = row as f32 + 0.5 - v;
             let row_weight = f32x8::splat((1.0 - dv * dv * inverse2).max(0.0));
             let [row_rise, row_height, dv2] =
                 [self.slope[1] * dv, self.clamped_slope[1] * dv, dv * dv].map(f32x8::splat);
-            let texels = self.map.texels.heights.get(row * stride + first..).unwrap_or_default();
-            for (c, texels) in texels.as_chunks::<LANES>().0.iter().take(CHUNKS).enumerate() {
-                let heights = f32x8::new(*texels);
+            let at = row * stride + first;
+            row += STEP;
+            let Some(texels) = self.map.texels.heights.get(at..at + CHUNKS * LANES) else { break };
+            let texels = texels.as_chunks::<LANES>().0;
+            for c in 0..CHUNKS {
+                let heights = f32x8::new(texels[c]);
                 let weight = weights[c] * row_weight;
                 let is_higher = heights.simd_gt(limit + (plane_rise[c] + row_rise).fast_max(f32x8::ZERO));
                 if !is_higher.any() {
