@@ -563,28 +563,37 @@ impl MipLevel {
         let (x, y) = (clamped(u, self.size[0]), clamped(v, self.size[1]));
         let (i, j) = (x.fast_trunc_int(), y.fast_trunc_int());
         let columns = self.size[0].div_ceil(TILE);
-        let (at_x, at_y): ([u32; LANES], [u32; LANES]) = (cast(i), cast(j));
+        let tile_bits = const { TILE.ilog2() as i32 };
+        let tiles = (j >> tile_bits) * i32x8::splat(columns as i32) + (i >> tile_bits);
+        let is_one_tile = tiles.simd_eq(i32x8::splat(tiles.to_array()[0])).all();
+        let within = i32x8::splat(TILE as i32 - 1);
+        let (at_x, at_y) = (i & within, j & within);
         let mut corners = [[0_u32; LANES]; 4];
-        // The tile of the last lane: neighbouring points mostly have the same.
-        let (mut known, mut texels, mut width) = (usize::MAX, &[][..], 0);
-        for lane in 0..LANES {
-            let [i, j] = [at_x, at_y].map(|at| at[lane] as usize);
-            let (column, row) = (i / TILE, j / TILE);
-            let index = row * columns + column;
-            if index != known {
-                let corner = [column * TILE, row * TILE];
-                known = index;
-                texels = self.tiles.get(index).map_or(&[][..], |tile| tile.get_or_init(|| paint(corner)));
-                width = self.tile_size(corner)[0];
+        let [i, j, tiles] = [i, j, tiles].map(i32x8::to_array);
+        let mut read = |lanes: std::ops::Range<usize>| {
+            let corner = [i, j].map(|at| at[lanes.start] as usize / TILE * TILE);
+            let texels = self
+                .tiles
+                .get(tiles[lanes.start] as usize)
+                .map_or(&[][..], |tile| tile.get_or_init(|| paint(corner)));
+            let width = self.tile_size(corner)[0];
+            let at = (at_y * i32x8::splat(width as i32) + at_x).to_array();
+            for lane in lanes {
+                let first = at[lane] as usize;
+                let rows = texels.get(first..first + width + 2).unwrap_or_default();
+                if let (Some(top), Some(bottom)) = (rows.first_chunk::<2>(), rows.last_chunk::<2>()) {
+                    (corners[0][lane], corners[1][lane]) = (top[0], top[1]);
+                    (corners[2][lane], corners[3][lane]) = (bottom[0], bottom[1]);
+                }
             }
-            let first = (j % TILE) * width + i % TILE;
-            let rows = texels.get(first..first + width + 2).unwrap_or_default();
-            if let (Some(top), Some(bottom)) = (rows.first_chunk::<2>(), rows.last_chunk::<2>()) {
-                (corners[0][lane], corners[1][lane]) = (top[0], top[1]);
-                (corners[2][lane], corners[3][lane]) = (bottom[0], bottom[1]);
-            }
+        };
+        // Neighbouring points mostly have one tile.
+        if is_one_tile {
+            read(0..LANES);
+        } else {
+            (0..LANES).for_each(|lane| read(lane..lane + 1));
         }
-        let fraction = |x: f32x8, i: i32x8| x - f32x8::from_i32x8(i);
+        let fraction = |x: f32x8, i: [i32; LANES]| x - f32x8::from_i32x8(i32x8::new(i));
         blend(corners.map(u32x8::new), fraction(x, i), fraction(y, j))
     }
 }
