@@ -12,7 +12,8 @@
 //! 3. Each tile is rasterised with four samples per pixel into triangle ids and depths, and with one at the centre
 //!    for depth and segmentation (`raster`).
 //! 4. Each surface that a pixel shows is shaded once, eight points at a time (`render::tile`): Lambert and GGX under a
-//!    key light with soft shadows and a sky (`shade`).
+//!    key light with soft shadows and a sky (`shade`). In triangles of many pixels, light that changes linearly is
+//!    interpolated between rows (`render::rows`).
 //!
 //! Materials are procedural functions of the object frame. [`RenderMesh`] bakes them into vertices or
 //! textures once, filtered to the spacing of the samples. Objects that do not move are drawn once for a

@@ -32,6 +32,13 @@ const MATERIAL: usize = 6;
 /// Index of the first texture coordinate.
 const UV: usize = 12;
 
+/// Surface points at eight neighbouring pixels.
+pub(crate) struct RowSamples {
+    pub(crate) points: SurfaceSamples,
+    /// Width of a pixel projected onto the surface, m; zero without a texture.
+    pub(crate) footprint: f32x8,
+}
+
 /// A triangle prepared for interpolation.
 #[derive(Clone, Copy)]
 pub(crate) struct TriangleInterpolator<'a> {
@@ -68,25 +75,53 @@ impl<'a> TriangleInterpolator<'a> {
         }
     }
 
-    /// Surface points at eight neighbouring pixels, all of which this triangle covers; (x, y) is the centre of the
+    /// Surface points at eight neighbouring pixels, all of which this triangle covers, given the centre of the
     /// first.
-    pub(crate) fn row(&self, lens: &Lens, x: f32, y: f32) -> SurfaceSamples {
+    pub(crate) fn row(&self, lens: &Lens, centre: [f32; 2]) -> RowSamples {
+        let w = self.row_weights(lens, centre);
+        let attribute = |i: usize| self.attribute(&w, i);
+        let mut points = surface_samples(attribute, f32x8::splat(object_index(self.id) as f32), lens);
+        let mut footprint = f32x8::ZERO;
+        if let Some(chart) = self.chart {
+            footprint = pixel_footprint(attribute, points.n, lens);
+            (points.albedo, points.roughness) = chart.sample([UV, UV + 1].map(attribute), footprint);
+        }
+        RowSamples { points, footprint }
+    }
+
+    /// Diffuse albedo and roughness at the points of [`row`](Self::row), given the width of a pixel there.
+    #[inline(always)]
+    pub(crate) fn row_material(&self, lens: &Lens, centre: [f32; 2], footprint: f32x8) -> (Vec3x8, f32x8) {
+        let w = self.row_weights(lens, centre);
+        let attribute = |i: usize| self.attribute(&w, i);
+        let (albedo, roughness) = match self.chart {
+            Some(chart) => chart.sample([UV, UV + 1].map(attribute), footprint),
+            None => (vec3_attribute(attribute, MATERIAL), attribute(MATERIAL + ROUGHNESS)),
+        };
+        (albedo * (f32x8::ONE - attribute(MATERIAL + METALNESS)), roughness)
+    }
+
+    /// True if the specular reflection of the triangle has the colours of a texture, as metals have it.
+    pub(crate) fn is_textured_metal(&self) -> bool {
+        self.chart.is_some() && self.corners.iter().any(|corner| corner[MATERIAL + METALNESS] > 0.0)
+    }
+
+    /// Barycentric coordinates at eight neighbouring pixels; [x, y] is the centre of the first.
+    #[inline(always)]
+    fn row_weights(&self, lens: &Lens, [x, y]: [f32; 2]) -> [f32x8; 3] {
         let (first, right) = (lens.ray(x, y), lens.right.cast());
         let weights = self
             .barycentric
             .map(|b| f32x8::splat(b.dot(&first) as f32) + f32x8::splat(b.dot(&right) as f32) * LANE_INDEX);
         let scale = f32x8::ONE / (weights[0] + weights[1] + weights[2]);
-        let w = weights.map(|weight| weight * scale);
-        let attribute = |i: usize| {
-            let [a, b, c] = self.corners.map(|corner| f32x8::splat(corner[i]));
-            a * w[0] + b * w[1] + c * w[2]
-        };
-        let mut samples = surface_samples(attribute, f32x8::splat(object_index(self.id) as f32), lens);
-        if let Some(chart) = self.chart {
-            let footprint = pixel_footprint(attribute, samples.n, lens);
-            (samples.albedo, samples.roughness) = chart.sample([UV, UV + 1].map(attribute), footprint);
-        }
-        samples
+        weights.map(|weight| weight * scale)
+    }
+
+    /// An attribute at points with these barycentric coordinates.
+    #[inline(always)]
+    fn attribute(&self, w: &[f32x8; 3], i: usize) -> f32x8 {
+        let [a, b, c] = self.corners.map(|corner| f32x8::splat(corner[i]));
+        a * w[0] + b * w[1] + c * w[2]
     }
 
     /// Barycentric coordinates of the point of the triangle that appears nearest to (x, y).

@@ -2,10 +2,13 @@
 
 pub(crate) mod background;
 pub(crate) mod interpolate;
+pub(crate) mod moving;
 pub(crate) mod pass;
+pub(crate) mod rows;
 pub(crate) mod tile;
 
 use background::{BackgroundTile, CachedBackground};
+use moving::MovingObjects;
 use pass::{Channels, PosedObject, RenderPass};
 use tile::{TileDisplay, TileRect, TileResolver, is_all_moving};
 
@@ -15,15 +18,14 @@ use super::{
     lens::Lens,
     raster::{TileBins, TileSamples, TriangleBlock},
     scene::{FrameView, RenderScene},
-    shade::{occlusion::OcclusionEllipsoid, shadow::ShadowMap},
+    shade::occlusion::OcclusionEllipsoid,
 };
-use softvt_geometry::{Pose, Vec3};
 use softvt_scene::{Camera, CameraMount};
 
 /// Draws images of a [`RenderScene`] as cameras see it.
 ///
-/// A renderer keeps working memory between images. It also caches the moving shadows of the last state, which all
-/// cameras share, and the background (all fixed objects) of every camera that is fixed in the world. Neither changes
+/// A renderer keeps working memory between images. It also caches the moving objects of the last state with their
+/// shadows, which all cameras share, and the background (all fixed objects) of every camera that is fixed in the world. Neither changes
 /// depth or segmentation; with a cached background, colours of relit pixels differ from a full rendering by rounding.
 /// A renderer may be used with several scenes, but keeps the cache of one.
 #[derive(Debug, Default)]
@@ -33,35 +35,8 @@ pub struct Renderer {
     /// The scene of the caches.
     scene_id: Option<u64>,
     bins: TileBins,
-    moving_shadow: Option<MovingShadow>,
+    moving: Option<MovingObjects>,
     backgrounds: Vec<CachedBackground>,
-}
-
-/// The shadow map of the moving objects in one state.
-#[derive(Debug)]
-struct MovingShadow {
-    nodes: Vec<Vec<Vec3>>,
-    rigid: Vec<Pose>,
-    links: Vec<Vec<Pose>>,
-    hidden_id: u16,
-    map: ShadowMap,
-}
-
-impl MovingShadow {
-    fn update(&mut self, view: &FrameView, objects: &[PosedObject]) {
-        let is_same = self.nodes == view.nodes && self.rigid == view.rigid && self.links == view.links;
-        if is_same && self.hidden_id == view.hidden_id {
-            return;
-        }
-        self.hidden_id = view.hidden_id;
-        view.nodes.clone_into(&mut self.nodes);
-        view.rigid.clone_into(&mut self.rigid);
-        view.links.clone_into(&mut self.links);
-        let casters =
-            objects.iter().filter(|o| o.object.casts_shadow && o.object.is_moving() && !o.is_hidden);
-        self.map
-            .draw(casters.map(|o| (o.caster.posed.positions.as_slice(), o.caster.lod.triangles.as_slice())));
-    }
 }
 
 impl Renderer {
@@ -130,17 +105,12 @@ impl Renderer {
                 ..Self::default()
             };
         }
-        let posed = |index| PosedObject::new(scene, index, view, &lens);
+        let moving = self.moving.get_or_insert_with(|| MovingObjects::new(scene));
+        moving.adopt(view);
+        let posed = |index| PosedObject::new(scene, index, view, &lens, moving);
         let objects = (0..scene.objects.len()).map(posed).collect::<Result<Vec<_>, _>>()?;
-        let moving_shadow = self.moving_shadow.get_or_insert_with(|| MovingShadow {
-            nodes: Vec::new(),
-            rigid: Vec::new(),
-            links: Vec::new(),
-            hidden_id: 0,
-            map: ShadowMap::new(&scene.lighting),
-        });
         if channels.has_colours() {
-            moving_shadow.update(view, &objects);
+            moving.draw_shadow(view.hidden_id, &objects);
         }
         let occluders = |is_moving: bool| -> Vec<OcclusionEllipsoid> {
             let occluders = objects
@@ -155,7 +125,7 @@ impl Renderer {
             objects: &objects,
             fixed_occluders: &occluders(false),
             moving_occluders: &occluders(true),
-            moving_shadow: &moving_shadow.map,
+            moving_shadow: moving.shadow(),
             channels,
         };
         let mut image = if camera.mount != CameraMount::World || !channels.has_colours() {

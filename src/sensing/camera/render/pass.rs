@@ -1,17 +1,15 @@
 //! Everything that drawing one image needs: the posed objects, and the light on them.
 
-use std::sync::Arc;
-
-use super::interpolate::MeshInstance;
+use super::{interpolate::MeshInstance, moving::MovingObjects};
 use crate::camera::{
     error::CameraError,
     lens::Lens,
-    math::{V3, Vec3x8},
+    math::{V3, Vec3x8, f32x8},
     raster::{TileBins, first_triangle_id, object_index, triangle_index},
-    scene::{FrameView, PosedMesh, RenderObject, RenderScene},
+    scene::{FrameView, RenderObject, RenderScene},
     shade::{
         occlusion::{OcclusionEllipsoid, sky_visibility},
-        shading::{DirectAndAmbient, SurfaceSamples},
+        shading::{DirectAndAmbient, LightBySource, SurfaceSamples},
         shadow::ShadowMap,
     },
 };
@@ -58,13 +56,14 @@ impl<'a> PosedObject<'a> {
         index: usize,
         view: &FrameView,
         lens: &Lens,
+        moving: &mut MovingObjects,
     ) -> Result<Self, CameraError> {
         let object = &scene.objects[index];
         let mesh = &object.mesh;
-        let pose = |level: usize| {
+        let mut pose = |level: usize| {
             let lod = mesh.level(level)?;
             let posed = if object.is_moving() {
-                Arc::new(PosedMesh::new(object, lod, view)?)
+                moving.mesh(index, object, level, lod, view)?
             } else {
                 scene.fixed_mesh(index, level)?
             };
@@ -145,6 +144,13 @@ impl Channels {
     }
 }
 
+/// Fractions of the light that objects leave.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Visibility {
+    pub(crate) key: f32x8,
+    pub(crate) sky: f32x8,
+}
+
 impl RenderPass<'_> {
     /// Value of a triangle's object in segmentation images; 0 for none.
     pub(crate) fn segmentation_id(&self, id: u32) -> u16 {
@@ -161,23 +167,28 @@ impl RenderPass<'_> {
     /// Radiance of points that only fixed objects shadow and occlude.
     #[inline(always)]
     pub(crate) fn shade(&self, points: &SurfaceSamples) -> DirectAndAmbient {
-        let to_eye = (Vec3x8::splat(&self.lens.eye) - points.p).normalized();
-        let illumination = &self.scene.illumination;
-        let mut radiance = illumination.shade(points, to_eye);
-        let (fine, wide) = (&self.scene.fixed_shadow, self.scene.wide_shadow.as_ref());
-        radiance.direct =
-            radiance.direct * illumination.key_visibility_cascaded(points.p, &points.n, fine, wide);
-        radiance.ambient =
-            radiance.ambient * sky_visibility(self.fixed_occluders, points.p, points.n, points.object);
-        radiance
+        self.light(points).radiance(points.diffuse_albedo())
     }
 
-    /// The part of the radiance under fixed objects that moving objects leave.
+    /// Light reflected by points that only fixed objects shadow and occlude.
     #[inline(always)]
-    pub(crate) fn attenuate_by_moving(&self, radiance: DirectAndAmbient, points: &SurfaceSamples) -> Vec3x8 {
-        let key = self.scene.illumination.key_visibility(points.p, &points.n, self.moving_shadow);
-        let sky = sky_visibility(self.moving_occluders, points.p, points.n, points.object);
-        radiance.direct * key + radiance.ambient * sky
+    pub(crate) fn light(&self, points: &SurfaceSamples) -> LightBySource {
+        let to_eye = (Vec3x8::splat(&self.lens.eye) - points.p).normalized();
+        let illumination = &self.scene.illumination;
+        let LightBySource { direct, ambient } = illumination.reflect(points, to_eye);
+        let (fine, wide) = (&self.scene.fixed_shadow, self.scene.wide_shadow.as_ref());
+        let key = illumination.key_visibility_cascaded(points.p, &points.n, fine, wide);
+        let sky = sky_visibility(self.fixed_occluders, points.p, points.n, points.object);
+        LightBySource { direct: direct * key, ambient: ambient * sky }
+    }
+
+    /// Fractions of the key light and of the sky that moving objects leave.
+    #[inline(always)]
+    pub(crate) fn moving_visibility(&self, points: &SurfaceSamples) -> Visibility {
+        Visibility {
+            key: self.scene.illumination.key_visibility(points.p, &points.n, self.moving_shadow),
+            sky: sky_visibility(self.moving_occluders, points.p, points.n, points.object),
+        }
     }
 
     /// Sorts the triangles of moving objects, fixed ones, or one kind after the other into tiles.

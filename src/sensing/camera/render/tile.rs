@@ -3,8 +3,9 @@
 use wide::u32x8;
 
 use super::{
-    interpolate::{ShadingBatch, TriangleInterpolator},
-    pass::RenderPass,
+    interpolate::{RowSamples, ShadingBatch, TriangleInterpolator},
+    pass::{RenderPass, Visibility},
+    rows::{ShadedRows, is_close, is_near, mix, mix_vectors, shade_rows},
 };
 use crate::camera::{
     image::RenderedImage,
@@ -13,7 +14,52 @@ use crate::camera::{
     raster::{
         MOVING_FLAG, NO_TRIANGLE, SAMPLE_OFFSETS, SAMPLES_PER_PIXEL, TILE_EDGE, TileSamples, object_index,
     },
-    shade::shading::{DirectAndAmbient, SurfaceSamples},
+    shade::{
+        shading::{DirectAndAmbient, LightBySource, ReflectedLight, SurfaceSamples},
+        shadow::LightSpacePoints,
+    },
+};
+
+/// Maximum difference of roughness at which specular light is interpolated between rows.
+const MAX_ROUGHNESS_DEVIATION: f32 = 0.04;
+
+/// Some samples of a pixel.
+#[derive(Clone, Copy)]
+struct SampleGroup {
+    /// Their mean position within the pixel.
+    mean: [f32; 2],
+    /// The one that is nearest to it.
+    nearest: usize,
+}
+
+/// All groups of samples, by the bit mask of their members.
+const SAMPLE_GROUPS: [SampleGroup; 1 << SAMPLES_PER_PIXEL] = {
+    let mut groups = [SampleGroup { mean: [0.0; 2], nearest: 0 }; 1 << SAMPLES_PER_PIXEL];
+    let mut members = 1;
+    while members < groups.len() {
+        let (mut mean, mut count) = ([0.0, 0.0], 0.0);
+        let mut sample = 0;
+        while sample < SAMPLES_PER_PIXEL {
+            if members >> sample & 1 == 1 {
+                mean = [mean[0] + SAMPLE_OFFSETS[sample][0], mean[1] + SAMPLE_OFFSETS[sample][1]];
+                count += 1.0;
+            }
+            sample += 1;
+        }
+        mean = [mean[0] / count, mean[1] / count];
+        let (mut nearest, mut least, mut sample) = (0, f32::MAX, 0);
+        while sample < SAMPLES_PER_PIXEL {
+            let [u, v] = SAMPLE_OFFSETS[sample];
+            let distance2 = (u - mean[0]) * (u - mean[0]) + (v - mean[1]) * (v - mean[1]);
+            if members >> sample & 1 == 1 && distance2 < least {
+                (nearest, least) = (sample, distance2);
+            }
+            sample += 1;
+        }
+        groups[members] = SampleGroup { mean, nearest };
+        members += 1;
+    }
+    groups
 };
 
 /// Number of pixels of a tile.
@@ -47,6 +93,28 @@ impl PixelTargets {
     }
 }
 
+/// Rows of eight pixels of a tile, one below the other.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct RowRun {
+    /// The first pixel of the first row.
+    first: usize,
+    /// Position of its centre in the image, pixels.
+    centre: [f32; 2],
+    count: usize,
+}
+
+impl RowRun {
+    /// The first pixel of a row.
+    fn pixel(&self, row: usize) -> usize {
+        self.first + row * TILE_EDGE
+    }
+
+    /// Position of the centre of the first pixel of a row in the image, pixels.
+    fn position(&self, row: usize) -> [f32; 2] {
+        [self.centre[0], self.centre[1] + row as f32]
+    }
+}
+
 /// Receives the light that the pixels of a tile show.
 pub(crate) trait ShadingSink {
     /// Clears a pixel before its shares are added.
@@ -61,6 +129,14 @@ pub(crate) trait ShadingSink {
         surface: Option<&SurfaceSamples>,
         targets: &PixelTargets,
     );
+
+    /// Adds rows that one triangle covers.
+    fn add_rows(&mut self, pass: &RenderPass, triangle: &TriangleInterpolator, run: &RowRun) {
+        for row in 0..run.count {
+            let points = triangle.row(pass.lens, run.position(row)).points;
+            self.add(pass, pass.shade(&points), Some(&points), &PixelTargets::row(run.pixel(row)));
+        }
+    }
 }
 
 /// Three values per pixel of a tile, by channel.
@@ -106,7 +182,10 @@ impl ShadingSink for TileDisplay {
         surface: Option<&SurfaceSamples>,
         targets: &PixelTargets,
     ) {
-        let radiance = surface.map_or(radiance.ambient, |points| pass.attenuate_by_moving(radiance, points));
+        let radiance = surface.map_or(radiance.ambient, |points| {
+            let Visibility { key, sky } = pass.moving_visibility(points);
+            radiance.direct * key + radiance.ambient * sky
+        });
         let display = pass.scene.tone_mapper.display(radiance);
         if targets.is_row {
             self.store(targets.pixel[0] as usize, display);
@@ -115,6 +194,75 @@ impl ShadingSink for TileDisplay {
         for (channel, values) in self.0.iter_mut().zip(display.to_arrays()) {
             targets.for_each(|lane, pixel, share| channel[pixel] += share * values[lane]);
         }
+    }
+
+    fn add_rows(&mut self, pass: &RenderPass, triangle: &TriangleInterpolator, run: &RowRun) {
+        shade_rows(&mut TriangleRows { pass, triangle, run, display: self }, run.count);
+    }
+}
+
+/// Rows of a triangle.
+struct TriangleRows<'r, 'p, 'a> {
+    pass: &'r RenderPass<'p>,
+    triangle: &'r TriangleInterpolator<'a>,
+    run: &'r RowRun,
+    display: &'r mut TileDisplay,
+}
+
+/// The light in a row of a triangle.
+struct TriangleLight {
+    reflected: ReflectedLight,
+    roughness: f32x8,
+    /// As in [`RowSamples`].
+    footprint: f32x8,
+    /// The points in the frame of the moving shadows.
+    at: LightSpacePoints,
+}
+
+impl TriangleRows<'_, '_, '_> {
+    fn store(&mut self, row: usize, radiance: Vec3x8) {
+        self.display.store(self.run.pixel(row), self.pass.scene.tone_mapper.display(radiance));
+    }
+}
+
+impl ShadedRows for TriangleRows<'_, '_, '_> {
+    type Light = TriangleLight;
+
+    fn evaluate(&mut self, row: usize) -> TriangleLight {
+        let RowSamples { points, footprint } = self.triangle.row(self.pass.lens, self.run.position(row));
+        let LightBySource { direct, ambient } = self.pass.light(&points);
+        let Visibility { key, sky } = self.pass.moving_visibility(&points);
+        let reflected = direct * key + ambient * sky;
+        self.store(row, reflected.radiance(points.diffuse_albedo()));
+        let at = self.pass.moving_shadow.project(points.p);
+        TriangleLight { reflected, roughness: points.roughness, footprint, at }
+    }
+
+    fn is_linear(start: &TriangleLight, middle: &TriangleLight, end: &TriangleLight, share: f32) -> bool {
+        let is_close_in = |of: fn(&ReflectedLight) -> &Vec3x8| {
+            let [a, b] = [start, end].map(|light| of(&light.reflected));
+            is_close(of(&middle.reflected), &mix_vectors(a, b, share))
+        };
+        is_near(&start.at, &end.at)
+            && is_close_in(|light| &light.diffuse)
+            && is_close_in(|light| &light.specular)
+    }
+
+    fn interpolate(&mut self, row: usize, start: &TriangleLight, end: &TriangleLight, share: f32) {
+        let footprint = mix(start.footprint, end.footprint, share);
+        let (albedo, roughness) =
+            self.triangle.row_material(self.pass.lens, self.run.position(row), footprint);
+        let deviation = (roughness - mix(start.roughness, end.roughness, share)).abs();
+        if deviation.simd_gt(f32x8::splat(MAX_ROUGHNESS_DEVIATION)).any() || self.triangle.is_textured_metal()
+        {
+            self.evaluate(row);
+            return;
+        }
+        let reflected = ReflectedLight {
+            diffuse: mix_vectors(&start.reflected.diffuse, &end.reflected.diffuse, share),
+            specular: mix_vectors(&start.reflected.specular, &end.reflected.specular, share),
+        };
+        self.store(row, reflected.radiance(albedo));
     }
 }
 
@@ -165,6 +313,14 @@ impl TileRect {
     }
 }
 
+/// Rows of eight pixels, one below the other, that one triangle covers.
+struct CoveredRows {
+    id: u32,
+    from: usize,
+    /// The end of the last one.
+    to: usize,
+}
+
 /// Resolves the samples of a tile: finds the surfaces that each pixel shows and passes them to a sink.
 pub(crate) struct TileResolver<'a, 'p, S> {
     pass: &'p RenderPass<'a>,
@@ -190,10 +346,11 @@ impl<'a, 'p, S: ShadingSink> TileResolver<'a, 'p, S> {
 
     /// Resolves all pixels, or only those that show a moving object. Depth and segmentation go to `image` directly.
     pub(crate) fn run(&mut self, only_moving: bool) {
-        for y in 0..self.rect.height {
-            for x in (0..self.rect.width).step_by(LANES) {
+        for x in (0..self.rect.width).step_by(LANES) {
+            let all = (1 << (self.rect.width - x).min(LANES)) - 1;
+            let mut covered = CoveredRows { id: NO_TRIANGLE, from: 0, to: 0 };
+            for y in 0..self.rect.height {
                 let samples = self.samples.colour_ids(x, y);
-                let all = (1 << (self.rect.width - x).min(LANES)) - 1;
                 let colours = if only_moving { moving_pixels(&samples) & all } else { all };
                 let mut centres = all;
                 if self.samples.has_centres() {
@@ -209,7 +366,11 @@ impl<'a, 'p, S: ShadingSink> TileResolver<'a, 'p, S> {
                     continue;
                 }
                 if colours == all && is_uniform(&samples) {
-                    self.shade_row(samples[0], x, y);
+                    if (covered.id, covered.to) != (samples[0], y) {
+                        self.shade_covered(&covered, x);
+                        covered = CoveredRows { id: samples[0], from: y, to: y };
+                    }
+                    covered.to = y + 1;
                     continue;
                 }
                 let pixels = samples.as_chunks::<SAMPLES_PER_PIXEL>().0;
@@ -217,6 +378,7 @@ impl<'a, 'p, S: ShadingSink> TileResolver<'a, 'p, S> {
                     self.shade_pixel(*ids, x + lane, y);
                 }
             }
+            self.shade_covered(&covered, x);
         }
         self.flush();
     }
@@ -233,14 +395,11 @@ impl<'a, 'p, S: ShadingSink> TileResolver<'a, 'p, S> {
 
     /// Shades all pixels of a tile that triangle `id` covers wholly; only the samples at their centres are read.
     pub(crate) fn run_covered(&mut self, id: u32) {
-        for y in 0..self.rect.height {
-            for x in (0..self.rect.width).step_by(LANES) {
-                if self.samples.has_centres() {
-                    let (ids, w) = self.samples.centres(x, y);
-                    self.write_centres(x, y, &ids, w);
-                }
-                self.shade_row(id, x, y);
-            }
+        if self.samples.has_centres() {
+            self.run_centres();
+        }
+        for x in (0..self.rect.width).step_by(LANES) {
+            self.shade_covered(&CoveredRows { id, from: 0, to: self.rect.height }, x);
         }
     }
 
@@ -257,15 +416,21 @@ impl<'a, 'p, S: ShadingSink> TileResolver<'a, 'p, S> {
         }
     }
 
-    /// Shades eight pixels from (x, y) on, all covered by one triangle.
-    fn shade_row(&mut self, id: u32, x: usize, y: usize) {
-        let targets = PixelTargets::row(y * TILE_EDGE + x);
-        let (px, py) = ((self.rect.x + x) as f32 + 0.5, (self.rect.y + y) as f32 + 0.5);
+    /// Shades rows of eight pixels from column `x` on.
+    fn shade_covered(&mut self, &CoveredRows { id, from, to }: &CoveredRows, x: usize) {
+        let run = RowRun {
+            first: from * TILE_EDGE + x,
+            centre: [(self.rect.x + x) as f32 + 0.5, (self.rect.y + from) as f32 + 0.5],
+            count: to - from,
+        };
         if id == NO_TRIANGLE {
-            self.shade_background(f32x8::splat(px) + LANE_INDEX, f32x8::splat(py), &targets);
+            for row in 0..run.count {
+                let [px, py] = run.position(row);
+                let targets = PixelTargets::row(run.pixel(row));
+                self.shade_background(f32x8::splat(px) + LANE_INDEX, f32x8::splat(py), &targets);
+            }
         } else if let Some(triangle) = interpolator(&mut self.recent, self.pass, id) {
-            let points = triangle.row(self.pass.lens, px, py);
-            self.sink.add(self.pass, self.pass.shade(&points), Some(&points), &targets);
+            self.sink.add_rows(self.pass, triangle, &run);
         }
     }
 
@@ -283,22 +448,22 @@ impl<'a, 'p, S: ShadingSink> TileResolver<'a, 'p, S> {
             self.shade_share(ids[0], [x, y].map(|at| at as f32 + 0.5), pixel, 1.0);
             return;
         }
-        let position = |sample: usize| [0, 1].map(|axis| [x, y][axis] as f32 + SAMPLE_OFFSETS[sample][axis]);
-        let surfaces = ids.map(|id| self.pass.surface(id));
-        for first in 0..SAMPLES_PER_PIXEL {
-            let members = || (0..SAMPLES_PER_PIXEL).filter(|&other| surfaces[other] == surfaces[first]);
-            if members().next() != Some(first) {
-                continue;
-            }
-            let count = members().count() as f32;
-            let mean = [0, 1].map(|axis| members().map(|sample| position(sample)[axis]).sum::<f32>() / count);
-            let distance2 = |sample: usize| {
-                let [u, v] = position(sample);
-                (u - mean[0]) * (u - mean[0]) + (v - mean[1]) * (v - mean[1])
-            };
-            let nearest = members()
-                .fold(first, |best, other| if distance2(other) < distance2(best) { other } else { best });
-            self.shade_share(ids[nearest], mean, pixel, 0.25 * count);
+        let mut surfaces = [None; SAMPLES_PER_PIXEL];
+        for sample in 0..SAMPLES_PER_PIXEL {
+            let before = (0..sample).find(|&before| ids[before] == ids[sample]);
+            surfaces[sample] =
+                before.map_or_else(|| self.pass.surface(ids[sample]), |before| surfaces[before]);
+        }
+        let mut left = (1_usize << SAMPLES_PER_PIXEL) - 1;
+        while left != 0 {
+            let first = left.trailing_zeros() as usize;
+            let is_member = |sample: usize| usize::from(surfaces[sample] == surfaces[first]) << sample;
+            let members =
+                left & (0..SAMPLES_PER_PIXEL).fold(0, |members, sample| members | is_member(sample));
+            left &= !members;
+            let SampleGroup { mean: [u, v], nearest } = SAMPLE_GROUPS[members];
+            let share = members.count_ones() as f32 / SAMPLES_PER_PIXEL as f32;
+            self.shade_share(ids[nearest], [x as f32 + u, y as f32 + v], pixel, share);
         }
     }
 

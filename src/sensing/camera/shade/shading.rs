@@ -21,11 +21,69 @@ pub(crate) struct SurfaceSamples {
     pub(crate) object: f32x8,
 }
 
+impl SurfaceSamples {
+    /// The colour of diffuse reflection: metals have none.
+    #[inline(always)]
+    pub(crate) fn diffuse_albedo(&self) -> Vec3x8 {
+        self.albedo * (f32x8::ONE - self.metalness)
+    }
+}
+
 /// Radiance towards the eye, linear RGB, by source: the key light and the sky.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct DirectAndAmbient {
     pub(crate) direct: Vec3x8,
     pub(crate) ambient: Vec3x8,
+}
+
+/// Light towards the eye, linear RGB, apart from the diffuse albedo of the surface.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct ReflectedLight {
+    /// Diffuse radiance of a white surface.
+    pub(crate) diffuse: Vec3x8,
+    /// Specular radiance.
+    pub(crate) specular: Vec3x8,
+}
+
+impl ReflectedLight {
+    #[inline(always)]
+    pub(crate) fn radiance(&self, diffuse_albedo: Vec3x8) -> Vec3x8 {
+        self.diffuse.component_mul(diffuse_albedo) + self.specular
+    }
+}
+
+/// Light towards the eye by source: the key light and the sky.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct LightBySource {
+    pub(crate) direct: ReflectedLight,
+    pub(crate) ambient: ReflectedLight,
+}
+
+impl LightBySource {
+    /// Radiance of a surface of this diffuse albedo.
+    #[inline(always)]
+    pub(crate) fn radiance(&self, diffuse_albedo: Vec3x8) -> DirectAndAmbient {
+        DirectAndAmbient {
+            direct: self.direct.radiance(diffuse_albedo),
+            ambient: self.ambient.radiance(diffuse_albedo),
+        }
+    }
+}
+
+impl std::ops::Add for ReflectedLight {
+    type Output = Self;
+    #[inline(always)]
+    fn add(self, o: Self) -> Self {
+        Self { diffuse: self.diffuse + o.diffuse, specular: self.specular + o.specular }
+    }
+}
+
+impl std::ops::Mul<f32x8> for ReflectedLight {
+    type Output = Self;
+    #[inline(always)]
+    fn mul(self, by: f32x8) -> Self {
+        Self { diffuse: self.diffuse * by, specular: self.specular * by }
+    }
 }
 
 /// The key light and the sky of a scene, converted for shading.
@@ -77,31 +135,29 @@ impl Illumination {
         self.sky_gradient(z, z.abs())
     }
 
-    /// Radiance of surface points towards `to_eye` (unit vectors), before shadows and occlusion by other objects.
+    /// Light that surface points reflect towards `to_eye` (unit vectors), before shadows and occlusion by other objects.
     ///
     /// Lambert and GGX with Smith's height-correlated masking (Walter et al., Microfacet Models for Refraction, 2007;
     /// Heitz, Understanding the Masking-Shadowing Function, JCGT 2014) and Schlick's Fresnel term. The reflection of
     /// the sky uses Karis's fit (Physically Based Shading on Mobile, 2014).
     #[inline(always)]
-    pub(crate) fn shade(&self, s: &SurfaceSamples, to_eye: Vec3x8) -> DirectAndAmbient {
+    pub(crate) fn reflect(&self, s: &SurfaceSamples, to_eye: Vec3x8) -> LightBySource {
         let one = f32x8::ONE;
         let n_v = s.n.dot(to_eye).fast_max(f32x8::splat(0.02));
-        let diffuse = s.albedo * (one - s.metalness);
         let f0 = (s.albedo * s.metalness).map(|c| c + f32x8::splat(0.04) * (one - s.metalness));
         let reflect_z = s.n.z * (f32x8::splat(2.0) * s.n.dot(to_eye)) - to_eye.z;
         let reflected =
             self.sky_radiance(reflect_z) * (one - s.roughness) + self.sky_irradiance(reflect_z) * s.roughness;
         let [scale, bias] = environment_brdf(s.roughness, n_v);
-        let ambient = diffuse.component_mul(self.sky_irradiance(s.n.z))
-            + f0.map(|c| c * scale + bias).component_mul(reflected);
-        DirectAndAmbient {
-            direct: self.shade_direct(s, to_eye, diffuse, f0),
-            ambient: ambient * s.sky_visibility,
-        }
+        let ambient = ReflectedLight {
+            diffuse: self.sky_irradiance(s.n.z),
+            specular: f0.map(|c| c * scale + bias).component_mul(reflected),
+        };
+        LightBySource { direct: self.reflect_key(s, to_eye, f0), ambient: ambient * s.sky_visibility }
     }
 
     #[inline(always)]
-    fn shade_direct(&self, s: &SurfaceSamples, to_eye: Vec3x8, diffuse: Vec3x8, f0: Vec3x8) -> Vec3x8 {
+    fn reflect_key(&self, s: &SurfaceSamples, to_eye: Vec3x8, f0: Vec3x8) -> ReflectedLight {
         let (one, one_half) = (f32x8::ONE, f32x8::splat(0.5));
         let to_key = Vec3x8::splat(&self.to_key);
         let n_v = s.n.dot(to_eye).fast_max(f32x8::splat(0.02));
@@ -121,7 +177,8 @@ impl Illumination {
         // D V F for a light of irradiance π times its strength; D carries the fourth power of the half vector's length.
         let strength = a2 * one_half * half2 * half2 / (d * d * masking);
         let specular = f0.map(|c| (c + (one - c) * grazing) * strength);
-        (diffuse + specular).component_mul(Vec3x8::splat(&self.key)) * n_l
+        let diffuse = Vec3x8::splat(&self.key) * n_l;
+        ReflectedLight { diffuse, specular: specular.component_mul(diffuse) }
     }
 
     /// Visible fraction of the key light at points `p` of normals `n`, by one shadow map.
