@@ -2,7 +2,8 @@
 
 use std::{
     collections::BTreeMap,
-    io::{self, IsTerminal, Write},
+    fs::File,
+    io::{self, IsTerminal, Read, Write},
     path::Path,
     sync::{
         Mutex,
@@ -17,6 +18,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 
 use crate::error::CliError;
 use softvt_common::{
+    files::FileError,
     parallel::lock,
     text::{self, counted},
 };
@@ -113,6 +115,67 @@ pub(crate) fn print_recording(out: &Path, summary: Option<RecordingSummary>) -> 
         return Ok(());
     };
     print(&format!("{}{}\n", summary.text(), summary.manifest.display()))
+}
+
+/// The format of a file that a flag names as output.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum OutputFormat {
+    Svg,
+    Mcap,
+    Json,
+}
+
+impl OutputFormat {
+    fn name(self) -> &'static str {
+        match self {
+            Self::Svg => "SVG",
+            Self::Mcap => "MCAP",
+            Self::Json => "JSON",
+        }
+    }
+
+    /// The ending that names must have. Those of the other formats are free.
+    fn extension(self) -> Option<&'static str> {
+        (self == Self::Svg).then_some("svg")
+    }
+
+    /// True if a file of the format can begin with these bytes.
+    fn begins_with(self, bytes: &[u8]) -> bool {
+        let text = bytes.trim_ascii_start();
+        match self {
+            Self::Svg => text.starts_with(b"<svg") || text.starts_with(b"<?xml"),
+            Self::Mcap => bytes.starts_with(b"\x89MCAP0\r\n"),
+            Self::Json => text.starts_with(b"{"),
+        }
+    }
+}
+
+/// Checks before the work that the file of `flag` replaces nothing but a file of its format.
+///
+/// # Errors
+/// Its name has another ending than those of the format, or another file or a folder has the name.
+pub(crate) fn check_output_file(flag: &str, path: &Path, format: OutputFormat) -> Result<(), CliError> {
+    let file = path.display();
+    if let Some(extension) = format.extension()
+        && path.extension().is_none_or(|found| found != extension)
+    {
+        return Err(CliError::input(format!("{flag} {file}: give a file that ends in .{extension}")));
+    }
+    // Of a path that leads through a file, the system says so when it is written.
+    if !path.exists() {
+        return Ok(());
+    }
+    let mut first = Vec::new();
+    if path.is_file() {
+        let opened = File::open(path).and_then(|file| file.take(64).read_to_end(&mut first));
+        opened.map_err(FileError::io("read", path))?;
+    }
+    // Empty files, such as those of mktemp, hold nothing to lose.
+    if path.is_file() && (first.is_empty() || format.begins_with(&first)) {
+        return Ok(());
+    }
+    let name = format.name();
+    Err(CliError::input(format!("{flag} {file}: it exists and is no {name} file; give another name")))
 }
 
 /// Prints a message of the program to standard error, after `softvt: `, with control characters escaped.

@@ -1,6 +1,9 @@
 //! The files that `softvt report` writes: the page, its tables as Markdown and LaTeX, and a JSON row per run.
 
-use std::{fs, path::Path};
+use std::{
+    fs,
+    path::{Path, PathBuf},
+};
 
 use super::{
     leaderboard,
@@ -15,9 +18,22 @@ pub const PAGE: &str = "report.html";
 /// Name of the tables as Markdown.
 pub const MARKDOWN: &str = "report.md";
 
+/// The names of all files of a report.
+const FILES: [&str; 4] = [PAGE, MARKDOWN, "report.tex", "report.jsonl"];
+
 /// Comment at the top of the LaTeX file: the packages and engines it needs.
 const LATEX_HEADER: &str =
     "% Needs \\usepackage{booktabs}; of names in other alphabets, LuaLaTeX or XeLaTeX.\n";
+
+/// The first file in the folder `out` that a report would replace, where [`write`] has not written [`PAGE`].
+pub fn foreign_file(out: &Path) -> Option<PathBuf> {
+    let page = fs::read_to_string(out.join(PAGE)).unwrap_or_default();
+    // A page names the suites of its runs at its top.
+    if page.starts_with("<!DOCTYPE html>") && page.contains("<title>softvt: ") {
+        return None;
+    }
+    FILES.iter().map(|name| out.join(name)).find(|path| path.exists())
+}
 
 /// Writes [`PAGE`], [`MARKDOWN`], `report.tex` and `report.jsonl` about some runs into the folder `out`. The page shows
 /// the objects that have a picture in `thumbnails`.
@@ -30,12 +46,13 @@ pub fn write(runs: &[RunSummary], thumbnails: &Thumbnails, out: &Path) -> Result
     let tables = all_tables(runs);
     let joined =
         |format: fn(&ResultTable) -> String| tables.iter().map(format).collect::<Vec<_>>().join("\n");
-    for (name, text) in [
-        (PAGE, page::page(runs, thumbnails, out)),
-        (MARKDOWN, joined(ResultTable::markdown)),
-        ("report.tex", LATEX_HEADER.to_owned() + &joined(ResultTable::latex)),
-        ("report.jsonl", leaderboard::rows(runs)),
-    ] {
+    let texts = [
+        page::page(runs, thumbnails, out),
+        joined(ResultTable::markdown),
+        LATEX_HEADER.to_owned() + &joined(ResultTable::latex),
+        leaderboard::rows(runs),
+    ];
+    for (name, text) in FILES.into_iter().zip(texts) {
         files::replace(&out.join(name), text)?;
     }
     Ok(())

@@ -30,6 +30,17 @@ fn recordings_are_printed_checked_and_reproduced() {
     assert!(project.refusal("replay a 0/2").contains("no such demonstration"));
     assert!(project.succeeds("dataset stats a").out.contains("length (steps)"));
     assert!(project.text("a/stats.svg").starts_with("<svg"));
+    project.succeeds("dataset stats a --out a/stats.svg");
+    let manifest = project.text("a/manifest.jsonl");
+    for (out, words) in [
+        ("a/manifest.jsonl", "--out a/manifest.jsonl: give a file that ends in .svg"),
+        ("a/kept.svg", "--out a/kept.svg: it exists and is no SVG file; give another name"),
+    ] {
+        project.write("a/kept.svg", b"not a plot");
+        assert_eq!(project.refusal(&format!("dataset stats a --out {out}")), words);
+    }
+    assert_eq!(project.text("a/manifest.jsonl"), manifest);
+    assert_eq!(project.text("a/kept.svg"), "not a plot");
     project.write("elsewhere/note.txt", b"");
     for words in ["dataset check ../a", "replay ../a 0/1"] {
         let mut command = project.command(words);

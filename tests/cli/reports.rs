@@ -54,6 +54,20 @@ fn warnings_of_reports_are_printed_and_damaged_runs_refused() {
 }
 
 #[test]
+fn a_report_replaces_only_an_earlier_report() {
+    let project = project();
+    project.write("mine/report.md", b"my own words");
+    assert_eq!(
+        project.refusal("report runs/b --out mine"),
+        "--out: mine/report.md exists and is not of an earlier report; give another folder"
+    );
+    assert_eq!(project.text("mine/report.md"), "my own words");
+    for _ in 0..2 {
+        project.succeeds("report runs/b --out page");
+    }
+}
+
+#[test]
 fn merged_shards_are_printed() {
     let project = Small { task: "budget_steps = 8", ..Small::default() }.project();
     for shard in 1..=2 {

@@ -157,7 +157,13 @@ fn the_mcap_file_of_a_view_is_that_of_a_run_and_of_its_replay() {
     assert!(fs::read(project.path("seen/noop/episode.mcap")).expect("written") != of_run);
     let refused = project.refusal("x.lua --episodes 1 --mcap=3");
     assert!(refused.contains("--mcap 3: suite one runs only episode 0 of each task"), "{refused}");
-    assert!(project.refusal("replay run 0/0 --mcap run").contains("run"), "a folder");
+    project.succeeds("replay run 0/0 --mcap replayed/episode.mcap");
+    let results = fs::read(project.path("run/episodes.jsonl")).expect("written");
+    for path in ["run", "run/episodes.jsonl", "x.lua"] {
+        let refused = project.refusal(&format!("replay run 0/0 --mcap {path}"));
+        assert_eq!(refused, format!("--mcap {path}: it exists and is no MCAP file; give another name"));
+    }
+    assert!(fs::read(project.path("run/episodes.jsonl")).expect("there") == results);
 }
 
 #[test]

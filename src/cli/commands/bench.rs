@@ -6,7 +6,7 @@ use clap::{Args, value_parser};
 
 use crate::{
     error::CliError,
-    output::{eprint_notice, print},
+    output::{OutputFormat, check_output_file, eprint_notice, print},
 };
 use softvt_common::files::replace;
 use softvt_runner::{
@@ -34,17 +34,16 @@ pub(crate) struct BenchArgs {
 /// # Errors
 /// The suite cannot be run, or the file cannot be written.
 pub(super) fn run(args: &BenchArgs) -> Result<(), CliError> {
+    for (flag, path, format) in
+        [("--growth", &args.growth, OutputFormat::Svg), ("--out", &args.out, OutputFormat::Json)]
+    {
+        path.as_ref().map_or(Ok(()), |path| check_output_file(flag, path, format))?;
+    }
     let published = softvt_script::embedded("assets/rates.json")
         .ok_or_else(|| CliError::input("this build has no assets/rates.json, which names the suite"))?;
     let published: MachineRates = serde_json::from_slice(published)?;
     let on_stage = |stage: &str| eprint_notice(format!("measuring: {stage}"));
     if let Some(path) = &args.growth {
-        if path.extension().is_none_or(|extension| extension != "svg") {
-            return Err(CliError::input(format!(
-                "--growth {}: give a file that ends in .svg",
-                path.display()
-            )));
-        }
         let curves = growth::measure(&published.script, thread_count(args.threads), on_stage)?;
         replace(path, growth::plot(&curves))?;
         return print(&growth::table(&curves));

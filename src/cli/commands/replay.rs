@@ -7,7 +7,7 @@ use clap::Args;
 use crate::{
     args::load_one_run,
     error::CliError,
-    output::{Console, Progress, print, report_replays},
+    output::{Console, OutputFormat, Progress, check_output_file, print, report_replays},
 };
 use softvt_common::cancel;
 use softvt_dataset::layout::is_dataset;
@@ -57,6 +57,9 @@ pub(super) fn run(args: &ReplayArgs) -> Result<(), CliError> {
         check_complete(dir)?;
         let demos = [args.episode.find_demo(&enter_for_dataset(dir, &*observer)?)?];
         return report_replays(&demos, &simulate_demos(&demos, &observer)?);
+    }
+    if let Some(path) = &args.mcap {
+        check_output_file("--mcap", path, OutputFormat::Mcap)?;
     }
     let stored = load_one_run(dir)?;
     args.episode.find_record(&stored)?;

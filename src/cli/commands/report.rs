@@ -59,6 +59,12 @@ pub(crate) struct MergeArgs {
 /// # Errors
 /// A folder without a run, or a file that cannot be written.
 pub(super) fn report(args: &ReportArgs) -> Result<(), CliError> {
+    if let Some(found) = report_files::foreign_file(&args.out) {
+        return Err(CliError::input(format!(
+            "--out: {} exists and is not of an earlier report; give another folder",
+            found.display()
+        )));
+    }
     let mut stored = Vec::new();
     for dir in &args.runs {
         stored.extend(stored_run::load(dir)?);

@@ -85,6 +85,13 @@ pub(super) fn run(args: ViewArgs) -> Result<(), CliError> {
     };
     let runs: Vec<PreparedRun> = configs.iter().map(prepare).collect::<Result<_, _>>()?;
     RunFolder::check_vacant(&args.out).map_err(|error| CliError::input(format!("--out: {error}")))?;
+    let page = args.out.join(episode_page::PAGE);
+    if page.exists() && !args.out.join(episode_page::FRAME).exists() {
+        let page = page.display();
+        return Err(CliError::input(format!(
+            "--out: {page} exists and is not of an earlier view; give another folder"
+        )));
+    }
     files::create_folder(&args.out)?;
     config.observer.work("simulating the episode");
     let simulate = |number: usize| runs[number].run_episode(job, true, &runs[number].controllers);

@@ -12,7 +12,9 @@ use clap::{Args, Subcommand, value_parser};
 use crate::{
     args::parse_folder,
     error::CliError,
-    output::{Console, Progress, eprint_notice, print, print_json, report_replays},
+    output::{
+        Console, OutputFormat, Progress, check_output_file, eprint_notice, print, print_json, report_replays,
+    },
 };
 use softvt_common::cancel;
 use softvt_common::{files, text::counted};
@@ -196,6 +198,9 @@ fn warn_of_problems(data: &Path) -> Result<(), CliError> {
 /// The dataset cannot be read, or the plot cannot be written.
 fn run_stats(args: &DatasetStatsArgs) -> Result<(), CliError> {
     let path = &args.path;
+    let default = if path.is_dir() { path.join("stats.svg") } else { path.with_extension("stats.svg") };
+    let out = args.out.clone().unwrap_or(default);
+    check_output_file("--out", &out, OutputFormat::Svg)?;
     check_complete(path)?;
     let mut paths: Vec<PathBuf> = demos_of(path)?.into_iter().map(|demo| demo.file).collect();
     paths.dedup();
@@ -204,8 +209,6 @@ fn run_stats(args: &DatasetStatsArgs) -> Result<(), CliError> {
         true => print_json(&distributions),
         false => print(&stats::table(&distributions)),
     }?;
-    let default = if path.is_dir() { path.join("stats.svg") } else { path.with_extension("stats.svg") };
-    let out = args.out.clone().unwrap_or(default);
     files::replace(&out, stats::svg(&distributions).as_bytes())?;
     eprint_notice(out.display());
     if path.is_dir() { warn_of_problems(path) } else { Ok(()) }
