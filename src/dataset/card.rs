@@ -9,7 +9,8 @@ use serde::{Deserialize, Serialize};
 
 use super::{
     DatasetError, OptionalStream,
-    layout::{CARD, DATASET},
+    layout::{CARD, DATASET, MANIFEST},
+    manifest::ManifestEntry,
 };
 use softvt_common::files;
 use softvt_policy::profile::GripCode;
@@ -120,6 +121,40 @@ impl DatasetCard {
     /// Number of control steps.
     pub fn samples(&self) -> usize {
         self.tasks.iter().map(|task| task.samples).sum()
+    }
+
+    /// Checks that the lines of the manifest are of one recording, and of the tasks of this card.
+    ///
+    /// # Errors
+    /// The files of several recordings were put into one folder: a task is unknown, or seeds differ.
+    pub fn check_entries(&self, root: &Path, entries: &[ManifestEntry]) -> Result<(), DatasetError> {
+        let refuse = |index: usize, what: String| {
+            let what = format!(
+                "{what}: files of several recordings are in one folder; record their tasks together \
+                 (softvt record --task), or use each recording by itself"
+            );
+            Err(DatasetError::content(&root.join(MANIFEST), format!("line {}", index + 1), what))
+        };
+        let is_known = |entry: &ManifestEntry| {
+            self.tasks.iter().any(|task| task.task == entry.task_id && task.suite == entry.suite)
+        };
+        if let Some(index) = entries.iter().position(|entry| !is_known(entry)) {
+            let ManifestEntry { suite, task_id, .. } = &entries[index];
+            return refuse(index, format!("{suite} task {task_id}, which {DATASET} does not have"));
+        }
+        let seed = entries.first().map_or(0, |entry| entry.seed);
+        if let Some(index) = entries.iter().position(|entry| entry.seed != seed) {
+            return refuse(index, format!("seed {}, and the first line has {seed}", entries[index].seed));
+        }
+        let mut seen = BTreeSet::new();
+        let mut attempts = entries.iter().map(|entry| (entry, (&entry.suite, entry.task_id, entry.episode)));
+        match attempts.position(|(entry, attempt)| entry.origin.is_none() && !seen.insert(attempt)) {
+            Some(index) => {
+                let ManifestEntry { suite, task_id, episode, .. } = &entries[index];
+                refuse(index, format!("attempt {episode} of {suite} task {task_id} for a second time"))
+            }
+            None => Ok(()),
+        }
     }
 
     /// Writes both files, `dataset.json` last: its presence marks a complete dataset.

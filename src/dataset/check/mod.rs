@@ -13,7 +13,7 @@ use super::{
     DatasetError, StreamValues, TaskFile,
     card::DatasetCard,
     demonstration::{CAMERA_POSES, JOINT_ACTIONS, JOINT_TORQUES, actions_stream_name},
-    grip_labels::OPEN_FORCE,
+    grip_labels::{self, OPEN_FORCE},
     layout::{CARD, DEPTH_STREAMS, IMAGE_STREAMS, MANIFEST, is_image_stream},
     manifest::{self, ManifestEntry},
 };
@@ -21,8 +21,9 @@ use softvt_benchmark::{CONTROL_DT, CONTROL_HZ};
 use softvt_common::{files::FileError, text::counted};
 use softvt_geometry::{Quat, Vec3};
 use softvt_media::video;
-use softvt_policy::profile::GripCode;
+use softvt_policy::{Action, profile::GripCode};
 use softvt_robot::{
+    ik::ArmAngles,
     panda::{self, ARM_DOFS, JointRange},
     rotation,
 };
@@ -63,6 +64,10 @@ const REQUIRED_STREAMS: [(&str, &[usize]); 15] = [
 const TOLERANCE: f64 = 1e-6;
 /// Excess over the limits of a joint up to which a commanded position is likely meant, rad.
 const JOINT_MARGIN: f64 = 0.05;
+/// Largest distance between the place of an action and that of its joint positions in half of the steps, m.
+const MAX_JOINT_TARGET_ERROR_M: f64 = 0.005;
+/// Distance in half of the steps up to which joint positions are not taken for those of another step, m.
+const MIN_SHIFT_ERROR_M: f64 = 0.001;
 /// Greatest depth that a camera can see, m: another one is in another unit.
 const MAX_DEPTH_M: f32 = 100.0;
 
@@ -112,6 +117,7 @@ pub fn folder(root: &Path, scope: CheckScope) -> Result<CheckReport, DatasetErro
             check_videos(&mut report, root, entry);
         }
     }
+    report.take(card.check_entries(root, &entries));
     for task in &card.tasks {
         let of_task = |e: &&ManifestEntry| e.task_id == task.task && e.suite == task.suite;
         let listed: Vec<&ManifestEntry> = entries.iter().filter(of_task).collect();
@@ -207,7 +213,8 @@ fn stray_files(root: &Path, named: &BTreeMap<&str, Vec<&ManifestEntry>>) -> Vec<
 pub fn file(path: &Path) -> Result<CheckReport, DatasetError> {
     let file = TaskFile::open(path)?;
     let mut report = CheckReport::default();
-    if file.environment().is_ok_and(|environment| environment["env_name"] != "softvt") {
+    let has_record = file.demos.first().is_some_and(|demo| file.text(*demo, "metadata_json").is_ok());
+    if !has_record && file.environment().is_ok_and(|environment| environment["env_name"] != "softvt") {
         let error = DatasetError::not_recorded_by_softvt(path, "/data, attribute env_args");
         report.problems.push(error.to_string());
         return Ok(report);
@@ -242,6 +249,10 @@ fn check_demonstrations(report: &mut CheckReport, file: &TaskFile, scope: CheckS
     if let Some(environment) = report.take(file.environment()) {
         check_script(report, file, &environment);
     }
+    if !file.has_count("fps", CONTROL_HZ as usize) {
+        let what = format!("expected {CONTROL_HZ} control steps per second");
+        report.add(&file.path, "/data, attribute fps", what);
+    }
     let steps_before = report.steps;
     for &demo in &file.demos {
         report.demos += 1;
@@ -269,6 +280,7 @@ fn check_demonstrations(report: &mut CheckReport, file: &TaskFile, scope: CheckS
         }
         let is_read = |name: &&String| scope == CheckScope::Whole || !is_image_stream(name);
         names.iter().filter(is_read).for_each(|name| check.check_stream(name));
+        check.check_attributes();
         if has_required_shapes {
             check.check_relations();
         }
@@ -282,8 +294,12 @@ fn check_demonstrations(report: &mut CheckReport, file: &TaskFile, scope: CheckS
     }
 }
 
-/// Checks the path of the script that a replay of the file runs.
+/// Checks the environment, and the path of the script that a replay of the file runs.
 fn check_script(report: &mut CheckReport, file: &TaskFile, environment: &Value) {
+    if environment["env_name"] != "softvt" {
+        let what = format!("env_name is {}, and softvt records \"softvt\"", environment["env_name"]);
+        report.add(&file.path, "/data, attribute env_args", what);
+    }
     let script = environment["env_kwargs"]["script"].as_str().unwrap_or_default();
     let key = "/data, attribute env_args, script";
     if !is_script_path(script) {
@@ -308,6 +324,25 @@ struct DemoCheck<'a> {
 impl DemoCheck<'_> {
     fn add(&mut self, name: &str, what: impl Into<String>) {
         self.report.problems.push(self.file.error(self.demo, name, what).to_string());
+    }
+
+    /// Checks that the numeric attributes of the demonstration are those of its record.
+    fn check_attributes(&mut self) {
+        let Some(record) = self.report.take(self.file.record(self.demo)) else { return };
+        let id = &record.header.id;
+        for (name, expected) in [
+            ("num_samples", self.steps as u64),
+            ("task_id", id.task as u64),
+            ("demo_id", self.demo as u64),
+            ("attempt", u64::from(id.episode)),
+            ("success", u64::from(record.verdict.safety)),
+        ] {
+            if self.file.contradicts(self.demo, name, expected) {
+                let source = if name == "num_samples" { "the actions" } else { "its record and place" };
+                let key = format!("/data/demo_{}, attribute {name}", self.demo);
+                self.report.add(&self.file.path, &key, format!("expected {expected}, by {source}"));
+            }
+        }
     }
 
     /// Checks the length of a stream, and that its values are finite.
@@ -394,6 +429,33 @@ impl DemoCheck<'_> {
                 format!("step {step}: not the joint positions at the pose of the action"),
             );
         }
+        self.check_joint_targets(&joints, &actions);
+    }
+
+    /// Checks that commanded joint positions lead near the commanded poses. They are one step of inverse kinematics,
+    /// which differs by millimetres in fast motions, and by more where a pose is out of reach.
+    fn check_joint_targets(&mut self, joints: &[ArmAngles], actions: &[Action]) {
+        let Some(record) = self.report.take(self.file.record(self.demo)) else { return };
+        if record.stats.far_commands > 0 {
+            return;
+        }
+        let reached: Vec<Vec3> = joints.iter().map(|row| panda::tool_pose(row).translation.vector).collect();
+        let typical_error = |first: usize, first_action: usize| {
+            let pairs = reached.iter().skip(first).zip(actions.iter().skip(first_action));
+            let mut errors: Vec<f64> =
+                pairs.map(|(place, action)| (place - action.position_b).norm()).collect();
+            errors.sort_by(f64::total_cmp);
+            errors.get(errors.len() / 2).copied().unwrap_or(0.0)
+        };
+        let own = typical_error(0, 0);
+        if own > MAX_JOINT_TARGET_ERROR_M {
+            let what = format!("{:.1} mm from the poses of the actions in half of the steps", 1e3 * own);
+            return self.add(JOINT_ACTIONS, what);
+        }
+        let neighbour = typical_error(1, 0).min(typical_error(0, 1));
+        if own > MIN_SHIFT_ERROR_M && neighbour < 0.25 * own {
+            self.add(JOINT_ACTIONS, "they are one control step earlier or later than the actions");
+        }
     }
 
     /// Checks that the arm's drives hold it: they are never without torque after the first action.
@@ -423,10 +485,19 @@ impl DemoCheck<'_> {
             GripCode::Force => label == OPEN_FORCE,
             _ => (0.0..=1.0).contains(&label) && (is_closed || label == 0.0),
         };
+        let is_closed: Vec<bool> = binary.as_chunks::<7>().0.iter().map(|row| row[6] > 0.5).collect();
+        let closures: Vec<f64> = actions.as_chunks::<7>().0.iter().map(|row| row[6]).collect();
+        let is_other_width = |(label, expected): (&[f64; 7], f64)| (label[6] - expected).abs() > TOLERANCE;
+        let mut widths = labels.as_chunks::<7>().0.iter().zip(grip_labels::two_widths(&closures, &is_closed));
         let mut bad =
             rows.map(|((row, action), binary)| row[..6] != action[..6] || !is_label(row[6], binary[6] > 0.5));
         if let Some(step) = bad.position(|is_bad| is_bad) {
             self.add(name, format!("step {step}: not the actions in the grip code {}", code.name()));
+        } else if code == GripCode::TwoWidth
+            && let Some(step) = widths.position(is_other_width)
+        {
+            let what = "not 0 while open, and the median commanded closure while closed";
+            self.add(name, format!("step {step}: {what}"));
         }
     }
 

@@ -1,7 +1,8 @@
 //! Checks of readings: units, what one stream says of another, and readings that say nothing.
 
 use super::{DemoCheck, TOLERANCE, joint_beyond_limits};
-use crate::StreamValues;
+use crate::{StreamValues, demonstration::CAMERA_POSES, layout::IMAGE_STREAMS};
+use softvt_geometry::{Pose, Quat, Vec3};
 use softvt_robot::{
     gripper::MAX_WIDTH,
     panda::{self, ARM_DOFS},
@@ -15,8 +16,32 @@ const SENSOR_ERROR: f64 = 2e-3;
 /// Largest distance of an object from the origin, m: another one is in another unit.
 const MAX_DISTANCE_M: f64 = 20.0;
 
+/// Width of the tactile pictures, px.
+const TACTILE_WIDTH: f64 = 320.0;
+/// Height of the tactile pictures, px.
+const TACTILE_HEIGHT: f64 = 240.0;
+/// Distance of markers from the picture that shear explains, as a share of its edge.
+const MARKER_MARGIN: f64 = 0.1;
+
 /// Share of the peak of D that some control step before the last has at least.
 const MIN_SHARE_OF_PEAK: f64 = 0.5;
+
+/// The pose of a row: position, and quaternion w x y z.
+fn pose(row: &[f64; 7]) -> Pose {
+    let [x, y, z, w, i, j, k] = *row;
+    Pose::from_parts(Vec3::new(x, y, z).into(), Quat::new_unchecked(nalgebra::Quaternion::new(w, i, j, k)))
+}
+
+/// Index of the first pose that differs from the one at the start.
+fn first_moved(poses: &[Pose]) -> Option<usize> {
+    let first = poses.first()?;
+    poses.iter().position(|pose| {
+        let turn = (pose.rotation.coords - first.rotation.coords).norm();
+        let opposite = (pose.rotation.coords + first.rotation.coords).norm();
+        (pose.translation.vector - first.translation.vector).norm() > TOLERANCE
+            || turn.min(opposite) > TOLERANCE
+    })
+}
 
 impl DemoCheck<'_> {
     /// The numbers of a stream; none if it is missing, which is a problem only of required streams.
@@ -50,6 +75,7 @@ impl DemoCheck<'_> {
         self.check_gripper();
         self.check_ends();
         self.check_markers();
+        self.check_cameras();
         self.check_forces();
         self.check_shapes();
     }
@@ -113,7 +139,66 @@ impl DemoCheck<'_> {
         );
         let closures = self.values("obs/gripper_closure");
         let is_wrong = |closure: &&f64| !(-TOLERANCE..=1.0 + TOLERANCE).contains(*closure);
-        self.add_first("obs/gripper_closure", &closures, is_wrong, "expected a closure in 0..1");
+        if closures.iter().any(|closure| is_wrong(&closure)) {
+            let what = "expected a closure in 0..1";
+            return self.add_first("obs/gripper_closure", &closures, is_wrong, what);
+        }
+        let actions = self.values("actions");
+        let commanded = actions.as_chunks::<7>().0.iter().map(|row| row[6].clamp(0.0, 1.0));
+        let pairs = closures.iter().zip(std::iter::once(0.0).chain(commanded));
+        let is_wrong = |(closure, expected): &(&f64, f64)| (*closure - expected).abs() > TOLERANCE;
+        let what = "not the closure that the action before commands, and 0 in the first step";
+        self.add_first("obs/gripper_closure", pairs, is_wrong, what);
+    }
+
+    /// Checks that the cameras stand still, in the room or on the hand, and that their matrices are of their images.
+    fn check_cameras(&mut self) {
+        let tools = self.values("obs/eef_pose");
+        let tools: Vec<Pose> = tools.as_chunks::<7>().0.iter().map(pose).collect();
+        for (name, images) in CAMERA_POSES.into_iter().zip(IMAGE_STREAMS) {
+            let cameras = self.values(name);
+            let cameras: Vec<Pose> = cameras.as_chunks::<7>().0.iter().map(pose).collect();
+            let on_hand: Vec<Pose> =
+                tools.iter().zip(&cameras).map(|(tool, camera)| tool.inverse() * camera).collect();
+            if first_moved(&cameras).is_some()
+                && let Some(step) = first_moved(&on_hand)
+            {
+                let what = "the camera moves, both in the room and with the hand";
+                self.add(name, format!("step {step}: {what}"));
+            }
+            self.check_intrinsic(name, &format!("obs/{images}"));
+        }
+    }
+
+    /// Checks the attribute `intrinsic` of the poses of a camera: square pixels, and the centre that of its images.
+    fn check_intrinsic(&mut self, name: &str, images: &str) {
+        if !self.file.has(self.demo, name) {
+            return;
+        }
+        let Some(stream) = self.report.take(self.file.stream(self.demo, name)) else { return };
+        let text = stream.attributes.iter().find(|(name, _)| name == "intrinsic").map(|(_, text)| text);
+        let matrix = text.and_then(|text| serde_json::from_str::<[[f64; 3]; 3]>(text).ok());
+        let shape = self.file.shape(self.demo, images).ok().filter(|_| self.file.has(self.demo, images));
+        let is_right = matrix.is_some_and(|[[fx, skew, cx], [zero, fy, cy], last]| {
+            let is_centre = shape.as_ref().is_none_or(|shape| match shape[..] {
+                [_, height, width, _] => [2.0 * cx, 2.0 * cy] == [width as f64, height as f64],
+                _ => true,
+            });
+            [skew, zero] == [0.0; 2]
+                && last == [0.0, 0.0, 1.0]
+                && fx == fy
+                && fx > 0.0
+                && cx > 0.0
+                && cy > 0.0
+                && is_centre
+        });
+        if !is_right {
+            let found = text.map_or("missing", String::as_str);
+            let what = format!(
+                "attribute intrinsic: expected one focal length and the centre of the images, in pixels: {found}"
+            );
+            self.add(name, what);
+        }
     }
 
     /// Checks that the reward is 1 in the last step alone, which is the end.
@@ -144,7 +229,30 @@ impl DemoCheck<'_> {
                 .any(|markers| markers.as_chunks::<2>().0.windows(2).all(|pair| pair[0] == pair[1]))
         };
         let rows = values.chunks_exact(8 * MARKER_COUNT);
-        self.add_first(name, rows, is_point, "all markers of a finger are at one place");
+        self.add_first(name, rows.clone(), is_point, "all markers of a finger are at one place");
+        let is_outside = |row: &&[f64]| {
+            row.as_chunks::<2>().0.iter().any(|[x, y]| {
+                let is_beyond =
+                    |at: f64, edge: f64| at < -MARKER_MARGIN * edge || at > (1.0 + MARKER_MARGIN) * edge;
+                is_beyond(*x, TACTILE_WIDTH) || is_beyond(*y, TACTILE_HEIGHT)
+            })
+        };
+        self.add_first(
+            name,
+            rows.clone(),
+            is_outside,
+            "a marker outside of the tactile picture: is it x, y in px?",
+        );
+        let initial =
+            |row: &[f64]| [0, 4 * MARKER_COUNT].map(|finger| row[finger..finger + 2 * MARKER_COUNT].to_vec());
+        let first = rows.clone().next().map(initial);
+        let is_other = |row: &&[f64]| Some(initial(row)) != first;
+        self.add_first(
+            name,
+            rows,
+            is_other,
+            "initial positions of markers that are not those of the first step",
+        );
     }
 
     /// Checks that contacts, forces and the actions beside them agree.

@@ -47,7 +47,11 @@ fn demonstration(salt: f64) -> Demonstration {
             constant("obs/gripper_width", &[1], 0.06),
             constant("obs/gripper_width_sensed", &[1], 0.0592),
             constant("obs/gripper_close_norm", &[1], 0.25),
-            constant("obs/gripper_closure", &[1], 0.2 + salt),
+            DataStream::f64(
+                "obs/gripper_closure",
+                &[1],
+                each(&|step| vec![if step == 0 { 0.0 } else { 0.3 }]),
+            ),
         ],
         privileged: vec![
             DataStream::f32("privileged/states/deformable_object/bun/nodal_pos_w", &[70_000, 3], {
@@ -145,7 +149,8 @@ fn readings_in_other_units_or_without_content_are_reported() {
         (5, 1e3, "obs/gripper_width_sensed: step 0: not near obs/gripper_width"),
         (5, 0.0, "obs/gripper_width_sensed: step 0: not near obs/gripper_width"),
         (6, 100.0, "obs/gripper_close_norm: step 0: not 1 - width / 0.08 m"),
-        (7, 255.0, "obs/gripper_closure: step 0: expected a closure in 0..1"),
+        (7, 255.0, "obs/gripper_closure: step 1: expected a closure in 0..1"),
+        (7, 0.5, "obs/gripper_closure: step 1: not the closure that the action before commands"),
     ] {
         let text = scaled(at, factor);
         assert!(text.contains(words), "{words}: {text}");
@@ -166,6 +171,84 @@ fn readings_in_other_units_or_without_content_are_reported() {
     ] {
         assert!(text.contains(words), "{words}: {text}");
     }
+}
+
+#[test]
+fn cameras_that_move_or_have_another_matrix_are_reported() {
+    let camera = |places: &dyn Fn(usize) -> f64, matrix: &str| {
+        problems(|streams| {
+            let rows = (0..STEPS).flat_map(|step| [places(step), 0.0, 0.5, 1.0, 0.0, 0.0, 0.0]).collect();
+            let poses = DataStream::f64("obs/agentview_pose", &[7], rows);
+            streams.push(poses.attribute("intrinsic", matrix));
+            let pixels = (0..STEPS * 24).map(|at| at as u8).collect();
+            streams.push(DataStream::u8("obs/agentview_rgb", &[2, 4, 3], pixels));
+        })
+    };
+    let matrix = "[[3.0, 0.0, 2.0], [0.0, 3.0, 1.0], [0.0, 0.0, 1.0]]";
+    assert_eq!(camera(&|_| 1.0, matrix), "");
+    let moving = camera(&|step| 0.1 * step as f64, matrix);
+    assert!(moving.contains("obs/agentview_pose: step 1: the camera moves"), "{moving}");
+    for wrong in
+        ["[[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]", "none", &matrix.replace("1.0]", "2.0]")]
+    {
+        let text = camera(&|_| 1.0, wrong);
+        assert!(text.contains("obs/agentview_pose: attribute intrinsic: expected one focal"), "{text}");
+    }
+}
+
+#[test]
+fn attributes_that_differ_from_the_record_are_reported() {
+    for name in ["num_samples", "task_id", "demo_id", "attempt", "success"] {
+        let text = changed(|file| demo_0(file).set_attr_numeric(name, &77_i64).unwrap());
+        assert!(text.contains(&format!("/data/demo_0, attribute {name}: expected ")), "{name}: {text}");
+    }
+    let rate = changed(|file| {
+        file.root_group().group("data").unwrap().set_attr_numeric("fps", &10_i64).unwrap();
+    });
+    assert!(rate.contains("/data, attribute fps: expected 20 control steps per second"), "{rate}");
+}
+
+#[test]
+fn joint_positions_and_widths_of_other_actions_are_reported() {
+    let with = |change: &dyn Fn(&mut Demonstration)| {
+        let mut demonstration = demonstration(0.0);
+        change(&mut demonstration);
+        let (_folder, path) = write(&demonstration, "task.hdf5");
+        file(&path).unwrap().problems.join("\n")
+    };
+    let turned = with(&|demonstration| {
+        demonstration.joint_commands.iter_mut().flatten().for_each(|joint| *joint += 0.05);
+    });
+    assert!(
+        turned.contains("actions_joints: ") && turned.contains("mm from the poses of the actions"),
+        "{turned}"
+    );
+    let late = with(&|demonstration| demonstration.joint_commands.rotate_right(1));
+    assert!(late.contains("actions_joints: they are one control step earlier or later"), "{late}");
+    let narrow = changed(|file| {
+        let name = "data/demo_0/actions_two_width";
+        let mut rows = file.dataset(name).unwrap().read_raw::<f64>().unwrap();
+        rows.chunks_exact_mut(7).for_each(|row| row[6] *= 0.5);
+        file.delete_dataset(name).unwrap();
+        let made = demo_0(file).new_dataset::<f64>().shape([STEPS, 7]).create("actions_two_width");
+        made.unwrap().write_raw(&rows).unwrap();
+    });
+    assert!(narrow.contains("actions_two_width: step 5: not 0 while open, and the median"), "{narrow}");
+}
+
+#[test]
+fn markers_outside_of_the_picture_or_exchanged_are_reported() {
+    let markers = |change: &dyn Fn(&mut [f32])| {
+        problems(|streams| {
+            let markers = streams.iter_mut().find(|stream| stream.name == "obs/gripper_marker_motion");
+            let StreamValues::F32(markers) = &mut markers.expect("markers").values else { panic!("float32") };
+            change(markers);
+        })
+    };
+    let far = markers(&|all| all.iter_mut().for_each(|at| *at *= 10.0));
+    assert!(far.contains("step 0: a marker outside of the tactile picture"), "{far}");
+    let moved = markers(&|all| all[8 * MARKER_COUNT] += 1.0);
+    assert!(moved.contains("step 1: initial positions of markers that are not those"), "{moved}");
 }
 
 #[test]

@@ -86,7 +86,9 @@ pub(super) fn select(config: &ExportConfig) -> Result<Selection, DatasetError> {
             "images are stored only as videos, whose compression is lossy; record them in the HDF5 files";
         return Err(DatasetError::content(&card_path, "pictures", what));
     }
-    let entries = matching_entries(root, manifest::read(root)?, &config.tasks)?;
+    let entries = manifest::read(root)?;
+    card.check_entries(root, &entries)?;
+    let entries = matching_entries(root, entries, &config.tasks)?;
     let mut seen = BTreeSet::new();
     if let Some(twice) = entries.iter().find(|entry| !seen.insert((&entry.hdf5_path, entry.demo_id))) {
         let what = format!("{} demo_{} is listed twice", twice.hdf5_path, twice.demo_id);

@@ -153,6 +153,12 @@ fn format_of(file: &TaskFile, environment: &Value) -> Result<ForeignFormat, Data
     }
     let shape = file.shape(first, "actions")?;
     let is_robosuite = || environment["type"] == 1 || ROBOSUITE.iter().any(|name| file.has(first, name));
+    let has_record = || file.text(first, "metadata_json").is_ok_and(|text| text.contains("\"state_hash\""));
+    if !environment["env_name"].is_string() && has_record() {
+        let what = "it names no env_name, and the demonstrations have records of softvt: restore env_args of the recording, \
+                    whose env_name is softvt";
+        return Err(DatasetError::content(&file.path, "/data, attribute env_args", what));
+    }
     match shape[..] {
         [_, 7 | 13] if file.has(first, "obs/eef_pose") => Ok(ForeignFormat::SoftVtBench),
         [_, 7] if is_robosuite() => Ok(ForeignFormat::Libero),

@@ -475,6 +475,15 @@ fn files_that_hold_no_demonstrations_are_reported() {
     let mut other = FileBuilder::new(Value::Null);
     other.each("actions", |_| vec![0.0; 7]);
     assert!(other.refusal().contains("unknown format"));
+    // A recording of softvt whose environment was lost.
+    let mut recorded = FileBuilder::libero();
+    recorded.environment = json!({});
+    recorded.demo.push(("metadata_json", "{\"state_hash\":\"00\"}".to_owned()));
+    assert!(
+        recorded.refusal().contains("/data, attribute env_args: it names no env_name"),
+        "{}",
+        recorded.refusal()
+    );
 }
 
 #[test]
