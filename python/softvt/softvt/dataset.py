@@ -84,7 +84,8 @@ class Dataset:
             as "privileged/d".
         horizon: number of actions of an item.
         control: motion of the actions, "pose" or "joints".
-        gripper: grip code of the actions; by default that of the recording, as of its exports. Needed for files of recordings that differ in it.
+        gripper: grip code of the actions; by default that of the recording, as of its exports. Needed for files of recordings that differ in it, and
+            for files outside of the folder of their recording.
         suite: only the demonstrations of this suite.
         task: only these tasks. Needs `suite` if the recording has several suites.
         safe: True for the safe demonstrations only. By default all that were kept, which are safe unless they were recorded with `--keep goal`.
@@ -304,10 +305,14 @@ def _recorded_gripper(files: Iterable[Path]) -> str:
     codes: dict[str | None, Path] = {}
     for file in files:
         codes.setdefault(_card_gripper(file), file)
+    fix = "give gripper, such as gripper='continuous'"
     if len(codes) > 1:
         found = "; ".join(f"{file}: {'no dataset.json' if code is None else code}" for code, file in codes.items())
-        raise ValueError(f"the files differ in their grip code ({found}); give gripper, such as gripper='continuous'")
-    return next(iter(codes)) or "continuous"
+        raise ValueError(f"the files differ in their grip code ({found}); {fix}")
+    code, file = next(iter(codes.items()))
+    if code is None:
+        raise ValueError(f"{file}: no dataset.json of its recording, which has the grip code; {fix}, or the folder of the recording")
+    return code
 
 
 def _card_gripper(file: Path) -> str | None:
@@ -315,13 +320,22 @@ def _card_gripper(file: Path) -> str | None:
     for folder in file.resolve().parents[:2]:
         card = folder / "dataset.json"
         if card.is_file():
-            try:
-                gripper = json.loads(card.read_text(encoding="utf-8")).get("gripper") or "continuous"
-            except (ValueError, AttributeError) as error:
-                raise ValueError(f"{card}: not the file that softvt record wrote: {error}; give gripper to do without it") from error
+            contents = _card(card)
+            if contents is None:
+                raise ValueError(f"{card}: not the file that softvt record wrote: no JSON object; give gripper to do without it")
+            gripper = contents.get("gripper") or "continuous"
             require_one_of(f"{card}: gripper", gripper, [*ACTIONS])
             return str(gripper)
     return None
+
+
+def _card(file: Path) -> dict[str, Any] | None:
+    """Contents of `dataset.json`; None if it is missing or not as softvt wrote it."""
+    try:
+        contents = json.loads(file.read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return None
+    return contents if isinstance(contents, dict) else None
 
 
 def _streams_below(demo: Any, name: str) -> list[str]:
@@ -348,6 +362,7 @@ def _manifest_lines(file: Path, known: dict[Path, list[dict[str, Any]]]) -> dict
             continue
         if manifest not in known:
             known[manifest] = _lines(manifest)
+            _refuse_merged(manifest, known[manifest])
         names = {name for name in {line["hdf5_path"] for line in known[manifest]} if (folder / name).resolve() == file.resolve()}
         if names:
             found: dict[str, dict[str, Any]] = {}
@@ -356,6 +371,21 @@ def _manifest_lines(file: Path, known: dict[Path, list[dict[str, Any]]]) -> dict
                     raise ValueError(f"{manifest}: demo_{line['demo_id']} of {line['hdf5_path']} has two lines; {_CHECK}")
             return found
     return None
+
+
+def _refuse_merged(manifest: Path, lines: list[dict[str, Any]]) -> None:
+    """Raises ValueError for a manifest with lines of several recordings, whose grip codes may differ."""
+    tasks = (_card(manifest.with_name("dataset.json")) or {}).get("tasks")
+    known = {(task.get("suite"), task.get("task")) for task in tasks} if isinstance(tasks, list) else None
+    fix = "files of several recordings are in one folder; give each recording by itself, or record their tasks together"
+    for number, line in enumerate(lines, 1):
+        place = (line.get("suite"), line.get("task_id"))
+        if known is not None and place not in known:
+            raise ValueError(f"{manifest}:{number}: {place[0]} task {place[1]}, which dataset.json does not have: {fix}; {_CHECK}")
+        if line.get("seed") != lines[0].get("seed"):
+            raise ValueError(
+                f"{manifest}:{number}: seed {line.get('seed')}, and the first line has {lines[0].get('seed')}: {fix}; {_CHECK}"
+            )
 
 
 def _is_interrupted(folder: Path) -> bool:

@@ -184,11 +184,16 @@ class Datasets(unittest.TestCase):
             shutil.copy(file, other)
             with h5py.File(other, "r+") as opened:
                 opened["data/demo_0"].attrs["task_suite"] = "mine"
-        self.assertEqual(len(softvt.Dataset(folder).demonstrations), 4)
+        code = {"gripper": "continuous"}
+        self.assertEqual(len(softvt.Dataset(folder, **code).demonstrations), 4)
+        with self.assertRaisesRegex(ValueError, "suites/.*hdf5: no dataset.json of its recording, which has the grip code; give gripper"):
+            softvt.Dataset(folder)
         with self.assertRaisesRegex(ValueError, "task=0: the recording has demonstrations of the suites mine, object_rigid; give suite"):
             softvt.Dataset(folder, task=0)
-        self.assertEqual([(demo.suite, demo.task) for demo in softvt.Dataset(folder, suite="mine", task=1).demonstrations], [("mine", 1)])
-        self.assertEqual(len(softvt.Dataset(folder, suite="object_rigid").demonstrations), 2)
+        self.assertEqual(
+            [(demo.suite, demo.task) for demo in softvt.Dataset(folder, suite="mine", task=1, **code).demonstrations], [("mine", 1)]
+        )
+        self.assertEqual(len(softvt.Dataset(folder, suite="object_rigid", **code).demonstrations), 2)
         with self.assertRaisesRegex(ValueError, "no demonstration of suite 'others'; the recording has those of mine, object_rigid"):
             softvt.Dataset(folder, suite="others")
 
@@ -232,6 +237,23 @@ class Datasets(unittest.TestCase):
         with self.assertRaisesRegex(ValueError, "twice/manifest.jsonl: demo_0 of hdf5/.*task0_demo.hdf5 has two lines"):
             softvt.Dataset(folder)
 
+    def test_files_of_several_recordings_in_one_folder_are_refused(self):
+        for number, (change, words) in enumerate(
+            [
+                ({"task_id": 7}, "manifest.jsonl:2: object_rigid task 7, which dataset.json does not have: files of several recordings"),
+                ({"seed": 3}, "manifest.jsonl:2: seed 3, and the first line has 0: files of several recordings"),
+            ]
+        ):
+            folder = FOLDER / f"merged{number}"
+            shutil.copytree(self.folder, folder)
+            first, second = (folder / "manifest.jsonl").read_text().splitlines()
+            (folder / "manifest.jsonl").write_text(f"{first}\n{json.dumps(json.loads(second) | change)}\n")
+            with self.subTest(words), self.assertRaisesRegex(ValueError, words):
+                softvt.Dataset(folder)
+            checked = subprocess.run([softvt.find_binary(), "dataset", "check", str(folder)], capture_output=True, text=True)
+            self.assertEqual(checked.returncode, 2)
+            self.assertIn("files of several recordings are in one folder", checked.stderr)
+
     def test_a_file_alone_does_not_contradict_itself(self):
         file = FOLDER / "alone.hdf5"
         source = next((self.folder / "hdf5").iterdir())
@@ -257,7 +279,7 @@ class Datasets(unittest.TestCase):
             with h5py.File(file, "r+") as opened:
                 change(opened["data"])
             with self.subTest(words), self.assertRaisesRegex(ValueError, f"alone.hdf5: {words}"):
-                softvt.Dataset(file)
+                softvt.Dataset(file, gripper="continuous")
 
     def test_statistics_are_those_of_the_chosen_demonstrations(self):
         data = softvt.Dataset(self.folder, keys=("state", "agentview_rgb", "privileged/pad_force"), gripper="binary", task=1)
@@ -309,7 +331,7 @@ class Datasets(unittest.TestCase):
         file.write_bytes(next((self.folder / "hdf5").iterdir()).read_bytes())
         with self.assertRaisesRegex(ValueError, words):
             softvt.Dataset(folder)
-        self.assertEqual(len(softvt.Dataset(file).demonstrations), 1)
+        self.assertEqual(len(softvt.Dataset(file, gripper="continuous").demonstrations), 1)
 
     def test_what_is_missing_is_named(self):
         for arguments, words in [
