@@ -16,6 +16,7 @@ from softvt.profile import action_size, parse_parts, proprio_parts
 from softvt.true_state import STATE_BOUNDS
 
 _CAMERAS = ("third_person", "wrist")
+_RATE_HZ = 20
 _SCENE_IMAGE = (224, 224, 3)
 """Shape of the images of all standard scenes."""
 
@@ -57,7 +58,14 @@ class SoftVTEnvConfig(EnvConfig):
     features_map: dict[str, str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        """Fills in the features of the observation and of the action."""
+        """Checks the options, and fills in the features of the observation and of the action."""
+        if self.fps != _RATE_HZ:
+            raise ValueError(f"env.fps={self.fps}: softvt's control rate is {_RATE_HZ} steps per second; leave it out")
+        if self.task_ids is not None:
+            if not self.task_ids:
+                raise ValueError("env.task_ids=[]: no task; leave it out for all tasks")
+            if len(set(self.task_ids)) < len(self.task_ids):
+                raise ValueError(f"env.task_ids={self.task_ids}: a task is named twice; name each once")
         finger = (240, 320, 3)
         visual: dict[str, dict[str, tuple[int, ...]]] = {
             "pixels": dict.fromkeys(_CAMERAS, self._image),
@@ -117,18 +125,38 @@ class SoftVTEnvConfig(EnvConfig):
         if not self.task:
             raise ValueError("env.task: give a standard suite or a Lua file")
         found: dict[str, dict[int, VectorEnv]] = {}
-        for script in self.task.split(","):
-            arguments = {**self.gym_kwargs, "script": script.strip()}
-            first = SoftVTVectorEnv(1, **arguments, task=None)
-            try:
-                self._check_images(first)
-                for suite in first.envs[0].hello["suites"]:
-                    known = [entry["task"] for entry in suite["tasks"]]
-                    tasks = known if self.task_ids is None else self.task_ids
-                    found[suite["name"]] = {task: SoftVTVectorEnv(n_envs, **arguments, suite=suite["name"], task=task) for task in tasks}
-            finally:
-                first.close()
+        scripts: dict[str, str] = {}
+        try:
+            for script in self.task.split(","):
+                self._add_suites(script.strip(), n_envs, found, scripts)
+        except BaseException:
+            for vectors in found.values():
+                for vector in vectors.values():
+                    vector.close()
+            raise
         return found
+
+    def _add_suites(self, script: str, n_envs: int, found: dict[str, dict[int, VectorEnv]], scripts: dict[str, str]) -> None:
+        """Adds the environments of a script to those found. `scripts` are the scripts of suites by the names of these, by which LeRobot tells
+        their results apart. Raises ValueError for a name of two suites."""
+        arguments = {**self.gym_kwargs, "script": script}
+        first = SoftVTVectorEnv(1, **arguments, task=None)
+        try:
+            self._check_images(first)
+            for suite in first.envs[0].hello["suites"]:
+                name = suite["name"]
+                if name in scripts:
+                    raise ValueError(
+                        f"env.task: {scripts[name]} and {script} both have a suite named {name!r}, under which results are kept; give one of them "
+                        "another name in its script, or evaluate them by two commands"
+                    )
+                scripts[name] = script
+                known = [entry["task"] for entry in suite["tasks"]]
+                vectors = found.setdefault(name, {})
+                for task in known if self.task_ids is None else self.task_ids:
+                    vectors[task] = SoftVTVectorEnv(n_envs, **arguments, suite=name, task=task)
+        finally:
+            first.close()
 
     def _check_images(self, vector: SoftVTVectorEnv) -> None:
         """Raises ValueError if the cameras of the scene have another size than the features."""

@@ -192,6 +192,15 @@ class Evaluations(unittest.TestCase):
             EnvConfig.get_choice_class("softvt")(obs="pixels+depth")
         with self.assertRaisesRegex(ValueError, "task 99: suite object_soft has the tasks 0 to 9"):
             make_env(EnvConfig.get_choice_class("softvt")(task=short_suite(), task_ids=[99]))
+        for options, words in [
+            ({"fps": 10}, "env.fps=10: softvt's control rate is 20 steps per second"),
+            ({"task_ids": []}, r"env.task_ids=\[\]: no task"),
+            ({"task_ids": [0, 0]}, r"env.task_ids=\[0, 0\]: a task is named twice"),
+        ]:
+            with self.subTest(options), self.assertRaisesRegex(ValueError, words):
+                EnvConfig.get_choice_class("softvt")(**options)
+        with self.assertRaisesRegex(ValueError, "env.task: object_soft and .*short.lua both have a suite named 'object_soft'"):
+            make_env(EnvConfig.get_choice_class("softvt")(task=f"object_soft,{short_suite()}", task_ids=[0]))
         with self.assertRaisesRegex(ValueError, "224 x 64 pixels; state --env.observation_height=224"):
             make_env(EnvConfig.get_choice_class("softvt")(task=short_suite(), flags=["--set", "cameras.width=64"]))
 
