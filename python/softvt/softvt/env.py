@@ -49,6 +49,12 @@ _FINGERS = ("left", "right")
 _MAX_IMAGE_EDGE = 4096  # pixels
 # What the server tells in `info` and the environment passes on under another name, or not at all.
 _OTHER_NUMBERS = ("task", "episode", "step", "carried_out")
+# What the server counts of commands that were not executed as given, in the words of the command line.
+_COMMANDS = {
+    "far_commands": "commands were out of reach; check the meaning of the actions (control) and their units, m and rad",
+    "clamped_grips": "grip values were out of range; check the grip code (gripper)",
+    "clamped_steps": "displacements were beyond −1..1; check the meaning of the actions (control)",
+}
 _SENSOR_EDGE = 240  # pixels of each image of the render mode "sensors"
 # Key of `get_state` for the last true states, which the server does not keep.
 _PAST_STATES = "past_true_states"
@@ -246,7 +252,7 @@ class SoftVTEnv(gymnasium.Env[Observation, np.ndarray]):
     def _ask(self, kind: str, **fields: Any) -> dict[str, Any]:
         """The response to a request about the present episode."""
         if self._client.is_interrupted and self._closer.alive:
-            raise ServerError(f"{kind}: the request before was interrupted; call reset first")
+            raise ServerError(f"{kind}: {self._client.interruption()}; call reset first")
         return self._client.request(kind, **fields)
 
     def _begin(self, suite: str | None, task: int | str | Sequence[int] | None, needs_truth: bool, history: int) -> None:
@@ -397,7 +403,7 @@ class SoftVTEnv(gymnasium.Env[Observation, np.ndarray]):
             return
         if self._has_probe or self._client.is_interrupted:
             # For `end_step`, so that the requests of a vector environment and their answers stay in step.
-            self._pending = "no episode yet" if self._has_probe else "the request before was interrupted"
+            self._pending = "no episode yet" if self._has_probe else self._client.interruption()
             return
         self._client.send("step", action=np.asarray(action))
         self._pending = "step"
@@ -433,6 +439,8 @@ class SoftVTEnv(gymnasium.Env[Observation, np.ndarray]):
         reward = self._reward_of(response, state)
         terminated, truncated = bool(response["terminated"]), bool(response["truncated"])
         self._is_open = self._is_of_run() and not (terminated or truncated)
+        if terminated or truncated:
+            self._warn_of_commands(info)
         self._freeze_end(response, observation, info)
         return observation, reward, terminated, truncated, info
 
@@ -514,6 +522,16 @@ class SoftVTEnv(gymnasium.Env[Observation, np.ndarray]):
                 f"suite {self._suite}, task {self.task}",
                 "an object of the goal has no limit τ, so that no episode is safe and no deformation costs; calibrate it (docs/calibration.md)",
             )
+
+    def _warn_of_commands(self, info: Mapping[str, Any]) -> None:
+        """Warns once of each kind of commands that were not executed as given in most steps of an episode, as `softvt` does after a run."""
+        steps = info["step"]
+        for counter, words in _COMMANDS.items():
+            count = info.get(counter, 0)
+            if 2 * count > steps and counter not in self._warned:
+                self._warned.add(counter)
+                where = f"suite {self._suite}, task {self.task}, episode {info['episode_index']}"
+                warnings.warn(f"{where}: {count} of {steps} {words}", stacklevel=2)
 
     def _warn_of_left_episode(self) -> None:
         """Warns once if an episode of a recorded run is left before its end: it has no record then."""

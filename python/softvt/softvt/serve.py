@@ -61,6 +61,7 @@ class Client:
         self._server = server
         self._socket: Any = None
         self._awaits_response = True
+        self._sender: threading.Thread | None = None
         self._process = os.getpid()
         header = {"Authorization": f"Bearer {token}"} if token else {}
         try:
@@ -88,6 +89,13 @@ class Client:
         """True if a request has no response: it was interrupted, for example by Ctrl-C, and the connection cannot be used any more."""
         return self._awaits_response
 
+    def interruption(self) -> str:
+        """Why the request before has no response, in words."""
+        sender = self._sender
+        if sender is not None and sender is not threading.current_thread() and sender.is_alive():
+            return f"thread {sender.name} waits for the response to its request; a connection is for one thread: give each thread its own"
+        return "the request before was interrupted"
+
     def send(self, kind: str, **fields: Any) -> None:
         """Sends a request without waiting. It has to be followed by a `receive` before the next one."""
         if self._socket is None:
@@ -97,9 +105,10 @@ class Client:
                 f"{kind}: the connection belongs to process {self._process}, of which this one is a fork; make the environment in this process"
             )
         if self._awaits_response:
-            raise ServerError(f"{kind}: the request before was interrupted; make a new connection")
+            raise ServerError(f"{kind}: {self.interruption()}; make a new connection")
         message = msgpack.packb({"type": kind, **fields}, default=_pack)
         self._awaits_response = True
+        self._sender = threading.current_thread()
         try:
             self._socket.send_binary(message)
         except (OSError, WebSocketException) as error:

@@ -3,6 +3,7 @@
 import copy
 import os
 import pickle
+import threading
 import unittest
 import warnings
 
@@ -306,6 +307,40 @@ class Environments(unittest.TestCase):
         with self.assertRaises((TypeError, OverflowError)):
             env.reset(options={"task": {0}})
         self.assertEqual(env.step(action)[4]["step"], 2)
+
+    def test_two_threads_in_one_environment_are_named(self):
+        env = self.make(obs="proprio")
+        env.reset(seed=1000)
+        sent, done = threading.Event(), threading.Event()
+
+        def step():
+            env.begin_step(HOLD)
+            sent.set()
+            done.wait(60)
+
+        other = threading.Thread(target=step, name="other")
+        other.start()
+        sent.wait(60)
+        try:
+            with self.assertRaisesRegex(softvt.ServerError, "thread other waits for the response .*: give each thread its own"):
+                env.get_state()
+        finally:
+            done.set()
+            other.join()
+
+    def test_commands_out_of_reach_are_a_warning_at_the_end_of_the_episode(self):
+        env = self.make(obs="proprio", control="pose")
+        # Millimetres in place of metres.
+        far = np.array([450.0, 0, 300, 3.1, 0, 0, 0])
+        env.reset(seed=1000)
+        with self.assertWarnsRegex(UserWarning, "task 0, episode 0: ([0-9]+) of \\1 commands were out of reach; check"):
+            for _ in range(STEPS):
+                env.step(far)
+        env.reset(seed=1001)
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")
+            for _ in range(STEPS):
+                env.step(far)
 
     def test_after_an_interrupted_step_a_vector_is_reset(self):
         envs = softvt.SoftVTVectorEnv(2, script=short_suite(), obs="proprio")
