@@ -15,6 +15,17 @@ pub const MAX_CHUNK_LEN: usize = 10_000;
 /// Length to which openpi's models pad actions (`action_dim` in its `pi0_config.py`).
 pub const PADDED_ACTION_LEN: usize = 32;
 
+/// Largest number of characters of a server's error in a message.
+const MAX_ERROR_CHARS: usize = 500;
+
+/// True for what a server sends that has no error: nil, false, an empty text or a zero.
+fn is_nothing(error: &Value) -> bool {
+    error.is_nil()
+        || error.as_bool() == Some(false)
+        || error.as_str() == Some("")
+        || error.as_u64() == Some(0)
+}
+
 /// Decodes a response: a map whose entry `actions` (or `action`) has the shape (horizon, n), (1, horizon, n) or
 /// (n). Without a length in the profile, n is 7, or 8 for joint positions, or 32 with padding.
 ///
@@ -39,8 +50,20 @@ pub fn chunk(response: &Value, encoding: &ActionEncoding) -> Result<ActionChunk,
         let kind = kind(response);
         return Err(PolicyError::Response(format!("is {kind}; expected a map with the entry actions")));
     }
-    let actions = entry(response, "actions")
-        .or_else(|| entry(response, "action"))
+    if let Some(error) = entry(response, "error").filter(|error| !is_nothing(error)) {
+        let text = error.as_str().map_or_else(|| error.to_string(), str::to_owned);
+        let text: String = text.chars().take(MAX_ERROR_CHARS).collect();
+        return Err(PolicyError::Response(format!("reports an error: {text}")));
+    }
+    let [several, one] = ["actions", "action"].map(|name| entry(response, name));
+    if let (Some(several), Some(one)) = (several, one)
+        && several != one
+    {
+        let what = "has an entry actions and another entry action: leave out one of them";
+        return Err(PolicyError::Response(what.to_owned()));
+    }
+    let actions = several
+        .or(one)
         .ok_or_else(|| PolicyError::Response(format!("has no entry actions; it has {}", names(response))))?;
     let NumberArray { shape, values } = numbers(actions)
         .map_err(|error| PolicyError::Response(format!("has {error} as actions; expected numbers")))?;
@@ -173,6 +196,12 @@ mod tests {
 
     #[test]
     fn replies_of_another_form_are_refused() {
+        let with = |key: &str, value: Value| {
+            let Value::Map(mut entries) = reply(vec![7], 0.1) else { panic!("a map") };
+            entries.push((key.into(), value));
+            Value::Map(entries)
+        };
+        assert!(read(with("error", Value::Nil)).is_ok() && read(with("state", 1.into())).is_ok());
         for (value, words) in [
             (reply(vec![0, 7], 0.0), "no action at all"),
             (reply(vec![10, 6], 0.0), "[10, 6]: too few numbers"),
@@ -182,6 +211,8 @@ mod tests {
             (Value::from("hi"), "is text"),
             (Value::Map(vec![("state".into(), 1.into())]), "no entry actions; it has state"),
             (Value::Map(vec![("actions".into(), "x".into())]), "has text as actions"),
+            (with("error", "model failed".into()), "reports an error: model failed"),
+            (with("action", vec![Value::from(1.0)].into()), "leave out one of them"),
         ] {
             match read(value) {
                 Err(PolicyError::Response(message)) => assert!(message.contains(words), "{message}"),

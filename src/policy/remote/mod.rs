@@ -191,7 +191,8 @@ fn observes_every_step(server: &PolicyServer, metadata: &Value) -> Result<bool, 
     })
 }
 
-/// Checks the entries `gripper` and `pose` of a server's metadata, by which it states the meaning of its actions.
+/// Checks the entries `gripper`, `pose`, `units` and `rotation` of a server's metadata, by which it states the
+/// meaning of its actions.
 ///
 /// # Errors
 /// They are not those of the profile.
@@ -242,8 +243,56 @@ fn check_action_codes(server: &PolicyServer, metadata: &Value) -> Result<(), Pol
             )));
         }
     }
+    if actions.units.is_some() {
+        // The profile converts what the server answers.
+        return Ok(());
+    }
+    let text = |key: &str| {
+        let value = entry(metadata, key)?;
+        let bytes = value.as_str().map(str::as_bytes).or(value.as_slice())?;
+        Some(String::from_utf8_lossy(bytes).trim().to_lowercase())
+    };
+    for (key, others, own) in
+        [("units", OTHER_UNITS, "m and rad"), ("rotation", OTHER_ROTATIONS, "axis_angle, in rad")]
+    {
+        if let Some(stated) = text(key).filter(|stated| others.contains(&stated.as_str())) {
+            return Err(server.error(&format!(
+                "states {stated:?} in the entry {key} of its metadata, and softvt reads {own}: convert them there, or \
+                 choose a profile with units"
+            )));
+        }
+    }
     Ok(())
 }
+
+/// Units of length and angle that are not softvt's, as servers may state them.
+const OTHER_UNITS: &[&str] = &[
+    "mm",
+    "millimeter",
+    "millimeters",
+    "cm",
+    "centimeter",
+    "centimeters",
+    "inch",
+    "inches",
+    "deg",
+    "degree",
+    "degrees",
+];
+/// Codes of rotations that are not softvt's, as servers may state them.
+const OTHER_ROTATIONS: &[&str] = &[
+    "deg",
+    "degree",
+    "degrees",
+    "euler",
+    "euler_xyz",
+    "rpy",
+    "quat",
+    "quaternion",
+    "quaternion_xyzw",
+    "quaternion_wxyz",
+    "rot6d",
+];
 
 /// openpi's protocol: sends an observation and receives a chunk of actions.
 fn infer_openpi(

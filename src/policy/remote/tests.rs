@@ -286,10 +286,49 @@ fn a_server_may_state_the_meaning_of_its_actions() {
         assert!(error.contains("expected one of continuous, binary, two-width, force"), "{error}");
     }
     assert_eq!(check_entry("pose", "absolute".into()), Ok(()));
+    for (key, own, other) in [("units", "m", "mm"), ("rotation", "axis_angle", "degrees")] {
+        assert_eq!(check_entry(key, own.into()), Ok(()));
+        let error = check_entry(key, other.into()).unwrap_err();
+        assert!(error.contains(&format!("states \"{other}\" in the entry {key} of its metadata")), "{error}");
+    }
     let error = check_entry("pose", "joints".into()).unwrap_err();
     assert!(error.contains("actions of pose joints") && error.contains("state reads absolute"), "{error}");
     let error = check_entry("pose", "tool".into()).unwrap_err();
     assert!(error.contains("expected one of absolute, delta, delta_osc, joints"), "{error}");
+}
+
+#[test]
+fn a_vla_eval_server_that_states_other_observations_is_refused() {
+    let check = |profile: &str, key: &'static str, dims: u64, format: &str| {
+        let mut server = policy_server(String::new(), GripCode::Binary, Duration::from_secs(1));
+        server.profile = Profile::named(profile).unwrap();
+        let part = map([("dims", Value::from(dims)), ("format", Value::from(format))]);
+        let hello = map([("observation_spec", map([(key, part)]))]);
+        vla_eval::check_observation_spec(&server, &hello).map_err(|error| error.to_string())
+    };
+    for (profile, key, dims, format) in [
+        ("vision", "image", 0, "rgb_hwc_uint8"),
+        ("vision", "language", 0, "language"),
+        ("vision", "state", 0, "raw"),
+        ("vision", "state", 7, "eef_pos3_axisangle3_finger1"),
+        ("libero", "state", 8, "eef_pos3_axisangle3_gripper2"),
+        ("vision", "state", 0, "joint_positions_and_more"),
+    ] {
+        assert_eq!(check(profile, key, dims, format), Ok(()), "{format}");
+    }
+    for (key, dims, format, expected) in [
+        (
+            "state",
+            14,
+            "eef_pos3_quat4_x",
+            "a state of 14 numbers (eef_pos3_quat4_x), and the profile vision sends 7",
+        ),
+        ("state", 7, "eef_pos3_euler3_gripper1", "rotations in another code than that of the profile vision"),
+        ("depth", 1, "depth_m", "depth (depth_m), which the profile vision does not send"),
+    ] {
+        let error = check("vision", key, dims, format).unwrap_err();
+        assert!(error.contains(expected) && error.contains("observation_spec"), "{error}");
+    }
 }
 
 #[test]
