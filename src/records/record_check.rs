@@ -163,6 +163,12 @@ impl EpisodeRecord {
             _ => return Err("some of kappa, tau and d_ref are null, and some are numbers".to_owned()),
         };
         let (d, tau) = (or_null(v.d_peak), or_null(v.tau));
+        if let Some(over) = v.time_over_tau_s.filter(|over| *over > 0.0)
+            && let (Some(peak), Some(limit)) = (v.d_peak, v.tau)
+            && peak <= limit
+        {
+            return Err(format!("time_over_tau_s is {over}, and d_peak {d} is not above tau {tau}"));
+        }
         if v.deformation_ok != ok(v.tau) {
             let got = or_null(v.deformation_ok);
             return Err(format!("deformation_ok is {got}, and d_peak is {d}, tau {tau}"));
@@ -377,6 +383,8 @@ mod tests {
         let kappas = refusal(&[("kappas", at), far]);
         assert!(kappas.contains("at kappa 0.3 deformation_ok is true"), "{kappas}");
         assert!(refusal(&[("safety_known", json!(false))]).contains("safety_known is false"));
+        let over = refusal(&[("time_over_tau_s", json!(0.25))]);
+        assert!(over.contains("time_over_tau_s is 0.25, and d_peak 0.33"), "{over}");
     }
 
     #[test]

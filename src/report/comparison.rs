@@ -97,7 +97,7 @@ pub fn compare(first: &[StoredRun], second: &[StoredRun]) -> Result<Comparison, 
     for runs in [first, second] {
         check_unique(runs)?;
     }
-    let (twins, pairing) = with_twins_paired(first, second);
+    let (twins, mut pairing) = with_twins_paired(first, second);
     let [first, second] = &twins;
     let count = |runs: &[StoredRun]| -> usize { runs.iter().map(|run| run.records.len()).sum() };
     let pairs = pair_episodes(records(first), records(second));
@@ -106,6 +106,7 @@ pub fn compare(first: &[StoredRun], second: &[StoredRun]) -> Result<Comparison, 
     if pairs.is_empty() || hashes(first).is_disjoint(&hashes(second)) {
         return Err(no_common_episode(first, second));
     }
+    pairing.extend(other_layouts(first, second));
     let task = |pairs: &[EpisodePair]| {
         let header @ EpisodeHeader { id, asset, .. } = &pairs[0].first.header;
         let differences = PairedComparison::from_pairs(pairs);
@@ -128,6 +129,22 @@ pub fn compare(first: &[StoredRun], second: &[StoredRun]) -> Result<Comparison, 
         all: PairedComparison::from_pairs(&pairs),
         by_task: group_by_task(&pairs).map(task).collect(),
     })
+}
+
+/// A sentence about the episodes that both sides have in different layouts; they are not paired.
+fn other_layouts(first: &[StoredRun], second: &[StoredRun]) -> Option<String> {
+    let layouts: BTreeMap<_, _> =
+        records(second).map(|record| (&record.header.id, record.header.layout.as_str())).collect();
+    let mut differing = records(first).filter_map(|record| {
+        let EpisodeHeader { id, layout, .. } = &record.header;
+        let other = layouts.get(id).filter(|other| **other != layout.as_str())?;
+        let place = format!("{} task {} episode {}", id.suite, id.task, id.episode);
+        Some(format!("first: {place}, {layout} and {other}"))
+    });
+    let first = differing.next()?;
+    let count = 1 + differing.count();
+    let (episodes, are) = (counted(count, "episode"), if count == 1 { "is" } else { "are" });
+    Some(format!("{episodes} that both runs have {are} not paired: the layouts differ ({first})"))
 }
 
 /// The runs, with the records of rigid twins under the name of the soft original if the other side has that: initial
@@ -658,6 +675,19 @@ mod tests {
         );
         part.manifest["settings"] = json!({ "robot": 1 });
         assert_eq!(differing(&part)[0], "settings");
+    }
+
+    #[test]
+    fn episodes_of_other_layouts_are_said_not_to_be_paired() {
+        let (a, mut b) = (run("a", 0.25, [None; 3]), run("b", 0.25, [None; 3]));
+        let own = a.records[1].header.layout.clone();
+        b.records[1].header.layout = "other".to_owned();
+        let compared = compare(std::slice::from_ref(&a), std::slice::from_ref(&b)).expect("pairs");
+        assert_eq!((compared.all.pairs, compared.unpaired), (2, 2));
+        let sentence = "1 episode that both runs have is not paired: the layouts differ (first: ";
+        assert!(compared.pairing[0].starts_with(sentence), "{:?}", compared.pairing);
+        assert!(compared.pairing[0].ends_with(&format!(", {own} and other)")), "{:?}", compared.pairing);
+        assert_eq!(compare(&[a.clone()], &[a]).expect("pairs").pairing, [""; 0]);
     }
 
     #[test]

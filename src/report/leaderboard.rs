@@ -113,4 +113,14 @@ mod tests {
         assert_eq!(row["goal"]["rate"], 100.0);
         assert_eq!(text.lines().count(), 1);
     }
+
+    #[test]
+    fn a_run_without_an_episode_is_as_privileged_as_its_policy() {
+        for policy in ["expert", "pi"] {
+            let row = rows(&summarize_runs(vec![stored("a", policy, Vec::new())]));
+            let row: Value = serde_json::from_str(&row).unwrap();
+            assert_eq!((&row["privileged"], &row["episodes"]), (&(policy == "expert").into(), &0.into()));
+            assert_eq!(row["method"] == policy, policy == "pi", "{row}");
+        }
+    }
 }

@@ -57,6 +57,10 @@ pub fn summarize_runs(mut runs: Vec<StoredRun>) -> Vec<RunSummary> {
 fn summarize(run: StoredRun) -> RunSummary {
     let mut summary = SuiteSummary::from_records(run.suite(), run.text("policy"), &run.records);
     summary.force_observed |= run.observes_forces();
+    if run.records.is_empty() {
+        // An unfinished run has no episode yet that says so.
+        summary.privileged |= run.manifest["privileged"] == true;
+    }
     let mut method = summary.method_label();
     // Changes to the suite, such as `mass=2`.
     let changes = run.changes().assignments();
