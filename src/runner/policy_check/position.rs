@@ -201,7 +201,7 @@ pub(super) fn explain_position(steps: &[StepSample], of: &AnswerAgreement) -> Op
     let text = match (of.correlation, of.scale) {
         (Some(r), Some(scale)) if r >= AGREES => lengths(steps, scale, ""),
         _ => "translation: the answers do not follow the demonstrations: check the images (order, flips, size), the \
-              normalisation of the state, and that the policy was trained on this suite"
+              axes of chunks (steps first, numbers of an action second), the normalisation of the state, and that the policy was trained on this suite"
             .to_owned(),
     };
     Some(PositionFinding { text, is_other_encoding: false, frame_turn: None })
