@@ -65,7 +65,7 @@ const TOLERANCE: f64 = 1e-6;
 /// Excess over the limits of a joint up to which a commanded position is likely meant, rad.
 const JOINT_MARGIN: f64 = 0.05;
 /// Largest distance between the place of an action and that of its joint positions in half of the steps, m.
-const MAX_JOINT_TARGET_ERROR_M: f64 = 0.005;
+const MAX_JOINT_TARGET_ERROR_M: f64 = 0.02;
 /// Distance in half of the steps up to which joint positions are not taken for those of another step, m.
 const MIN_SHIFT_ERROR_M: f64 = 0.001;
 /// Greatest depth that a camera can see, m: another one is in another unit.
@@ -433,7 +433,8 @@ impl DemoCheck<'_> {
     }
 
     /// Checks that commanded joint positions lead near the commanded poses. They are one step of inverse kinematics,
-    /// which differs by millimetres in fast motions, and by more where a pose is out of reach.
+    /// which differs by millimetres in motions of 20 mm per control step, by the square of that in faster ones, and by
+    /// more where a pose is out of reach.
     fn check_joint_targets(&mut self, joints: &[ArmAngles], actions: &[Action]) {
         let Some(record) = self.report.take(self.file.record(self.demo)) else { return };
         if record.stats.far_commands > 0 {
