@@ -109,9 +109,14 @@ fn a_view_replaces_an_earlier_one_and_keeps_other_files() {
     assert!(project.path("seen/mine/worst_wrist.png").is_file());
     // The folder of something else.
     project.write("page/index.html", b"mine");
-    project.write("page/end_of_study.png", b"mine");
-    project.succeeds("view x.lua --policy noop --out page");
-    assert!(project.path("page/end_of_study.png").is_file());
+    assert_eq!(
+        project.refusal("view x.lua --policy noop --out page"),
+        "--out: page/index.html exists and is not of an earlier view; give another folder"
+    );
+    assert_eq!(project.text("page/index.html"), "mine");
+    project.write("other/end_of_study.png", b"mine");
+    project.succeeds("view x.lua --policy noop --out other");
+    assert!(project.path("other/end_of_study.png").is_file());
 }
 
 #[test]
