@@ -117,8 +117,8 @@ impl RelativeNormal {
     }
 }
 
-/// A right-handed orthonormal frame of first axis `n`, a unit vector, whose second axis is `edge` as far as it is normal
-/// to `n`. Both other axes vanish if nothing of it is.
+/// A right-handed orthonormal frame of first axis `n`, a unit vector. Its second axis is the part of `edge` normal to
+/// `n`; without any, both other axes are zero.
 fn frame(n: &V3, edge: &V3) -> [V3; 3] {
     let t = edge - n * edge.dot(n);
     let t = t.try_normalize(0.0).unwrap_or_else(V3::zeros);

@@ -207,8 +207,8 @@ impl RenderMesh {
         self.levels.coarsest_where(is_good)
     }
 
-    /// The coarsest level that looks like the finest one where a pixel covers `pixel` metres, with small triangles where
-    /// an object has textures or deforms.
+    /// The coarsest level that looks like the finest one where a pixel covers `pixel` metres. Soft shapes are not
+    /// simplified.
     pub(crate) fn full_level(&self, pixel: f32) -> Result<&Lod, CameraError> {
         let levels = self.full_levels.as_ref().unwrap_or(&self.levels);
         levels.get(levels.coarsest_where(|lod| lod.is_fine_enough(pixel))?)

@@ -25,8 +25,9 @@ use softvt_scene::{Camera, CameraMount};
 /// Draws images of a [`RenderScene`] as cameras see it.
 ///
 /// A renderer keeps working memory between images. It also caches the moving objects of the last state with their
-/// shadows, which all cameras share, and the background (all fixed objects) of every camera that is fixed in the world. Neither changes
-/// depth or segmentation; with a cached background, colours of relit pixels differ from a full rendering by rounding.
+/// shadows, which all cameras share, and the background (all fixed objects) of every camera fixed in the world. Neither
+/// changes depth or segmentation; with a cached background, colours of relit pixels differ from a full rendering by
+/// rounding, and by the interpolation of light between rows.
 /// A renderer may be used with several scenes, but keeps the cache of one.
 #[derive(Debug, Default)]
 pub struct Renderer {

@@ -21,8 +21,8 @@ pub(crate) trait ShadedRows {
     /// Evaluates the light in a row and shades the row.
     fn evaluate(&mut self, row: usize) -> Self::Light;
 
-    /// True if the light in `middle`, the given share of the way from `start` to `end`, shows that it can be interpolated
-    /// between all three rows.
+    /// True if light can be interpolated between the three rows: `middle`, the given share of the way from `start` to
+    /// `end`, is close to the interpolation.
     fn is_linear(start: &Self::Light, middle: &Self::Light, end: &Self::Light, share: f32) -> bool;
 
     /// Shades a row by light that is interpolated, the given share of the way from `start` to `end`.

@@ -135,7 +135,7 @@ impl Illumination {
         self.sky_gradient(z, z.abs())
     }
 
-    /// Light that surface points reflect towards `to_eye` (unit vectors), before shadows and occlusion by other objects.
+    /// Light that surface points reflect towards `to_eye` (unit vectors), before shadows and occlusion by others.
     ///
     /// Lambert and GGX with Smith's height-correlated masking (Walter et al., Microfacet Models for Refraction, 2007;
     /// Heitz, Understanding the Masking-Shadowing Function, JCGT 2014) and Schlick's Fresnel term. The reflection of
