@@ -687,7 +687,10 @@ mod tests {
         let sentence = "1 episode that both runs have is not paired: the layouts differ (first: ";
         assert!(compared.pairing[0].starts_with(sentence), "{:?}", compared.pairing);
         assert!(compared.pairing[0].ends_with(&format!(", {own} and other)")), "{:?}", compared.pairing);
-        assert_eq!(compare(&[a.clone()], &[a]).expect("pairs").pairing, [""; 0]);
+        assert_eq!(
+            compare(std::slice::from_ref(&a), std::slice::from_ref(&a)).expect("pairs").pairing,
+            [""; 0]
+        );
     }
 
     #[test]
