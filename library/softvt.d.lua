@@ -1010,7 +1010,7 @@ function Body:deformation() end
 ---@return number?
 function Body:stable_strain() end
 
----Returns the compressive strain that `percent` of the volume stays below: 1 − σ_min(F) at the Gauss points, weighted by volume. 95 is usual; a number above 0 and at most 1 is most likely a share, and an error.
+---Returns the compressive strain that `percent` of the volume stays below: 1 − σ_min(F) at the Gauss points, weighted by volume. 95 is usual; a number between 0 and 1 is most likely a share, and an error.
 ---@param percent number
 ---@return number
 function Body:strain_percentile(percent) end
@@ -1052,7 +1052,7 @@ function Body:slipping(solid) end
 ---@class softvt.Solid
 local Solid = {}
 
----Prescribes the pose after the next step: position, m, and orientation as axis-angle, rad (none by default). To move it into a soft body by more than half of the body's thickness in one step is an error.
+---Prescribes the pose after the next step: position, m, and orientation as axis-angle, rad (none by default). A step that moves it through a soft body, or more than 1 mm into it, is an error.
 ---@param position number[]
 ---@param axis_angle? number[]
 function Solid:move_to(position, axis_angle) end

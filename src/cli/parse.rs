@@ -186,12 +186,13 @@ fn misspelt_command(words: &[String]) -> Option<String> {
 
 /// A message about a value that follows its flag as a word of its own, though only an equals sign gives the flag one.
 fn flag_without_equals(command: &clap::Command, words: &[String]) -> Option<String> {
-    let commands = || std::iter::once(command).chain(command.get_subcommands());
+    let command = words.iter().find_map(|word| command.find_subcommand(word)).unwrap_or(command);
     words.iter().zip(words.iter().skip(1)).find_map(|(flag, value)| {
         let is_value = !value.starts_with('-') && !value.ends_with(".lua");
         let name = flag.strip_prefix("--").filter(|_| is_value)?;
-        let mut flags = commands().flat_map(clap::Command::get_arguments);
-        let arg = flags.find(|arg| arg.get_long() == Some(name) && arg.is_require_equals_set())?;
+        let arg = command
+            .get_arguments()
+            .find(|arg| arg.get_long() == Some(name) && arg.is_require_equals_set())?;
         let help = arg.get_help().map(ToString::to_string).unwrap_or_default();
         Some(format!("{flag} takes its value after an equals sign: {flag}={value}. {help}"))
     })
@@ -226,7 +227,12 @@ mod tests {
         let told = message("softvt x.lua --video all").unwrap_or_default();
         let expected = "--video takes its value after an equals sign: --video=all. Render videos of unsafe episodes; =all for";
         assert!(told.starts_with(expected), "{told}");
-        for words in ["softvt --video x.lua", "softvt x.lua --video --json", "softvt x.lua --threads 2"] {
+        for words in [
+            "softvt replay run --mcap x.mcap",
+            "softvt --video x.lua",
+            "softvt x.lua --video --json",
+            "softvt x.lua --threads 2",
+        ] {
             assert_eq!(message(words), None, "{words}");
         }
     }

@@ -18,12 +18,14 @@ pub const PADDED_ACTION_LEN: usize = 32;
 /// Largest number of characters of a server's error in a message.
 const MAX_ERROR_CHARS: usize = 500;
 
-/// True for what a server sends that has no error: nil, false, an empty text or a zero.
+/// True for what a server sends that has no error: nil, false, a zero, or an empty text, list or map.
 fn is_nothing(error: &Value) -> bool {
     error.is_nil()
         || error.as_bool() == Some(false)
+        || error.as_f64() == Some(0.0)
         || error.as_str() == Some("")
-        || error.as_u64() == Some(0)
+        || error.as_array().is_some_and(Vec::is_empty)
+        || error.as_map().is_some_and(Vec::is_empty)
 }
 
 /// Decodes a response: a map whose entry `actions` (or `action`) has the shape (horizon, n), (1, horizon, n) or
@@ -55,15 +57,8 @@ pub fn chunk(response: &Value, encoding: &ActionEncoding) -> Result<ActionChunk,
         let text: String = text.chars().take(MAX_ERROR_CHARS).collect();
         return Err(PolicyError::Response(format!("reports an error: {text}")));
     }
-    let [several, one] = ["actions", "action"].map(|name| entry(response, name));
-    if let (Some(several), Some(one)) = (several, one)
-        && several != one
-    {
-        let what = "has an entry actions and another entry action: leave out one of them";
-        return Err(PolicyError::Response(what.to_owned()));
-    }
-    let actions = several
-        .or(one)
+    let actions = entry(response, "actions")
+        .or_else(|| entry(response, "action"))
         .ok_or_else(|| PolicyError::Response(format!("has no entry actions; it has {}", names(response))))?;
     let NumberArray { shape, values } = numbers(actions)
         .map_err(|error| PolicyError::Response(format!("has {error} as actions; expected numbers")))?;
@@ -212,7 +207,6 @@ mod tests {
             (Value::Map(vec![("state".into(), 1.into())]), "no entry actions; it has state"),
             (Value::Map(vec![("actions".into(), "x".into())]), "has text as actions"),
             (with("error", "model failed".into()), "reports an error: model failed"),
-            (with("action", vec![Value::from(1.0)].into()), "leave out one of them"),
         ] {
             match read(value) {
                 Err(PolicyError::Response(message)) => assert!(message.contains(words), "{message}"),

@@ -25,7 +25,7 @@ const FILES: [&str; 4] = [PAGE, MARKDOWN, "report.tex", "report.jsonl"];
 const LATEX_HEADER: &str =
     "% Needs \\usepackage{booktabs}; of names in other alphabets, LuaLaTeX or XeLaTeX.\n";
 
-/// The first file in the folder `out` that a report would replace, where [`write`] has not written [`PAGE`].
+/// The first file in the folder `out` that a report would replace, where [`write()`] has not written [`PAGE`].
 pub fn foreign_file(out: &Path) -> Option<PathBuf> {
     let page = fs::read_to_string(out.join(PAGE)).unwrap_or_default();
     // A page names the suites of its runs at its top.

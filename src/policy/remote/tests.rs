@@ -298,40 +298,6 @@ fn a_server_may_state_the_meaning_of_its_actions() {
 }
 
 #[test]
-fn a_vla_eval_server_that_states_other_observations_is_refused() {
-    let check = |profile: &str, key: &'static str, dims: u64, format: &str| {
-        let mut server = policy_server(String::new(), GripCode::Binary, Duration::from_secs(1));
-        server.profile = Profile::named(profile).unwrap();
-        let part = map([("dims", Value::from(dims)), ("format", Value::from(format))]);
-        let hello = map([("observation_spec", map([(key, part)]))]);
-        vla_eval::check_observation_spec(&server, &hello).map_err(|error| error.to_string())
-    };
-    for (profile, key, dims, format) in [
-        ("vision", "image", 0, "rgb_hwc_uint8"),
-        ("vision", "language", 0, "language"),
-        ("vision", "state", 0, "raw"),
-        ("vision", "state", 7, "eef_pos3_axisangle3_finger1"),
-        ("libero", "state", 8, "eef_pos3_axisangle3_gripper2"),
-        ("vision", "state", 0, "joint_positions_and_more"),
-    ] {
-        assert_eq!(check(profile, key, dims, format), Ok(()), "{format}");
-    }
-    for (key, dims, format, expected) in [
-        (
-            "state",
-            14,
-            "eef_pos3_quat4_x",
-            "a state of 14 numbers (eef_pos3_quat4_x), and the profile vision sends 7",
-        ),
-        ("state", 7, "eef_pos3_euler3_gripper1", "rotations in another code than that of the profile vision"),
-        ("depth", 1, "depth_m", "depth (depth_m), which the profile vision does not send"),
-    ] {
-        let error = check("vision", key, dims, format).unwrap_err();
-        assert!(error.contains(expected) && error.contains("observation_spec"), "{error}");
-    }
-}
-
-#[test]
 fn a_vla_eval_server_that_states_other_actions_is_refused() {
     let part = |format: &str, range: [f64; 2]| {
         map([("format", Value::from(format)), ("range", Value::Array(range.map(Value::F64).to_vec()))])

@@ -36,8 +36,7 @@ pub(super) fn greet(connection: &mut PolicyConnection, deadline: Instant) -> Res
     match entry(payload, "protocol_version").and_then(Value::as_u64) {
         Some(VERSION) | None => {
             super::check_action_codes(&connection.server, payload)?;
-            check_action_spec(&connection.server, payload)?;
-            check_observation_spec(&connection.server, payload)
+            check_action_spec(&connection.server, payload)
         }
         Some(other) => {
             let what = format!("uses version {other} of vla-eval's protocol; expected {VERSION}");
@@ -102,61 +101,6 @@ pub(super) fn check_action_spec(server: &PolicyServer, hello: &Value) -> Result<
             "the gripper as {gripper}{range}, and the profile {name} reads {open} as open and {closed} as closed: choose or \
              write a profile with these values"
         ));
-    }
-    Ok(())
-}
-
-/// Checks what the entry `observation_spec` of a server states of its observations. Images and the prompt pass under
-/// any name, and unknown formats of states by their length.
-///
-/// # Errors
-/// The profile sends another state, or lacks an entry.
-pub(super) fn check_observation_spec(server: &PolicyServer, hello: &Value) -> Result<(), PolicyError> {
-    let Profile { name: profile, inputs, .. } = &server.profile;
-    let spec = entry(hello, "observation_spec").and_then(Value::as_map);
-    let refuse = |what: String| {
-        Err(server
-            .error(&format!("expects {what} by its observation_spec: choose or write a profile with it")))
-    };
-    let state = inputs.iter().find_map(|input| match &input.source {
-        ObservationSource::State { parts } => Some(parts),
-        _ => None,
-    });
-    for (key, part) in spec.into_iter().flatten() {
-        let (Some(key), Some(format)) = (key.as_str(), entry(part, "format").and_then(Value::as_str)) else {
-            continue;
-        };
-        let numbers = entry(part, "dims").and_then(Value::as_u64).filter(|numbers| *numbers > 0);
-        if ["raw", "language"].contains(&format) || format.starts_with("rgb") {
-            continue;
-        }
-        if !["state", "states"].contains(&key) {
-            let is_sent =
-                |input: &ProfileInput| input.keys.iter().any(|own| own.rsplit('/').next() == Some(key));
-            if !inputs.iter().any(is_sent) {
-                return refuse(format!("{key} ({format}), which the profile {profile} does not send"));
-            }
-            continue;
-        }
-        let Some(parts) = state else {
-            return refuse(format!("a state ({format}), and the profile {profile} sends none"));
-        };
-        let own: usize = parts.iter().map(|part| part.count()).sum();
-        if let Some(numbers) = numbers.filter(|numbers| *numbers != own as u64) {
-            return refuse(format!(
-                "a state of {numbers} numbers ({format}), and the profile {profile} sends {own}"
-            ));
-        }
-        let is_other = |words: &str, own: &[RobotStatePart]| {
-            format.contains(words) && !parts.iter().any(|part| own.contains(part))
-        };
-        if is_other("euler", &[])
-            || is_other("quat", &[RobotStatePart::QuaternionWxyz, RobotStatePart::QuaternionXyzw])
-            || is_other("axisangle", &[RobotStatePart::AxisAngle])
-        {
-            let code = "rotations in another code than that of the profile";
-            return refuse(format!("a state of {own} numbers ({format}): {code} {profile}"));
-        }
     }
     Ok(())
 }

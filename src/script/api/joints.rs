@@ -11,7 +11,7 @@ use crate::{
     },
     vm::error::fail,
 };
-use softvt_common::text::{format_number, unknown_name};
+use softvt_common::text::{exact_number, format_number, unknown_name};
 use softvt_geometry::{Pose, Vec3};
 use softvt_physics::contact::Friction;
 use softvt_scene::{Asset, Body, Joint, JointMotion, MovingPart, Visual, part_poses};
@@ -82,7 +82,7 @@ fn check_limits(lua: &Lua, record: &Record, joint: &Table) -> mlua::Result<()> {
     if lower < upper {
         return Ok(());
     }
-    let (lower, upper) = (format_number(lower), format_number(upper));
+    let (lower, upper) = (exact_number(lower), exact_number(upper));
     Err(invalid(lua, record.label, "upper", format!("expected more than lower, {lower}, got {upper}")))
 }
 

@@ -30,7 +30,7 @@ use softvt_physics::{
     BodyId, ColliderId, ContactPartner, KinematicId, PhysicsParams, SoftId, World,
     contact::{Collider, Friction, SurfaceStiffness},
     fem::{FemState, StrainLimits, StrainMeter},
-    world::{ContactSummary, SoftBody, StepFailure},
+    world::{ContactSummary, Penetration, SoftBody, StepFailure, SweepStart},
 };
 use softvt_robot::{PadSpec, pads::PadSurface};
 use softvt_rollout::{MAX_OVERLAP, soft_model};
@@ -149,24 +149,27 @@ impl Inner {
     /// Refuses a body or solid that has been added where it overlaps another.
     fn refuse_overlap(&mut self, lua: &Lua, added: ContactPartner) -> mlua::Result<()> {
         let found = self.world.penetrations(MAX_OVERLAP);
-        let mut found = found.iter().filter(|penetration| penetration.bodies.contains(&added));
+        // Surfaces of soft bodies are compared undeformed.
+        let is_known = |penetration: &&Penetration| {
+            let is_soft = penetration.bodies.iter().all(|body| matches!(body, ContactPartner::Soft(_)));
+            penetration.bodies.contains(&added) && !(is_soft && self.world.time() > 0.0)
+        };
+        let mut found = found.iter().filter(is_known);
         let Some(penetration) = found.next() else { return Ok(()) };
         let [first, second] = penetration.bodies.map(|body| self.world.partner_name(body));
         let depth = significant(1e3 * penetration.depth, 3);
-        Err(fail(
-            lua,
-            format!("{first:?} and {second:?} overlap by {depth} mm at the start; move them apart"),
-        ))
+        Err(fail(lua, format!("{first:?} and {second:?} overlap by {depth} mm; move them apart")))
     }
 
-    /// Refuses a step in which a kinematic solid would pass through a body.
-    fn refuse_sweep(&self, lua: &Lua) -> mlua::Result<()> {
-        let Some(sweep) = self.world.kinematic_sweep() else { return Ok(()) };
+    /// Refuses a step since `start` in which a kinematic solid passed through a body.
+    fn refuse_sweep(&self, lua: &Lua, start: Option<SweepStart>) -> mlua::Result<()> {
+        let sweep = start.and_then(|start| self.world.sweep_since(&start, MAX_OVERLAP));
+        let Some(sweep) = sweep else { return Ok(()) };
         let (solid, body) = (&self.world.collider(sweep.collider).name, &self.world.soft(sweep.body).name);
         let [distance, limit] = [sweep.distance, sweep.limit].map(|length| significant(1e3 * length, 3));
         let message = format!(
-            "world:step: {solid:?} moves {distance} mm in one step, through {body:?}; move it by at most {limit} mm per \
-             step (half the thickness of the body) where they touch"
+            "world:step: {solid:?} moved {distance} mm in one step, through {body:?}; move it by at most {limit} mm per \
+             step (half the thickness of the body)"
         );
         Err(fail(lua, message))
     }
@@ -319,13 +322,16 @@ impl LuaWorld {
             ));
         }
         let _pause = inner.clock.pause();
-        inner.refuse_sweep(lua)?;
+        let start = inner.world.sweep_start();
         let Inner { world, timing, .. } = inner;
         let dt = world.params.dt;
         inner.failed = timing.measure(dt, || world.step()).err();
         let stats = inner.world.solver_stats();
         inner.newton_total += u64::from(stats.newton_steps);
         inner.newton_max = inner.newton_max.max(stats.max_newton_steps);
+        if inner.failed.is_none() {
+            inner.refuse_sweep(lua, start)?;
+        }
         Ok((inner.failed.is_none(), inner.failed.as_ref().map(StepFailure::to_string)))
     }
 }
@@ -441,10 +447,9 @@ class! {
             /// damage_strain; nil if it states none.
             fn stable_strain(_, this) -> ["number?"] { lock(&this.world).stable_strains[this.id.index()] }
             /// Returns the compressive strain that `percent` of the volume stays below: 1 − σ_min(F) at the Gauss
-            /// points, weighted by volume. 95 is usual; a number above 0 and at most 1 is most likely a share, and an
-            /// error.
+            /// points, weighted by volume. 95 is usual; a number between 0 and 1 is most likely a share, and an error.
             fn strain_percentile(lua, this, percent: f64 = PERCENT) -> ["number"] {
-                if percent > 0.0 && percent <= 1.0 {
+                if percent > 0.0 && percent < 1.0 {
                     let (given, meant) = (format_number(percent), significant(100.0 * percent, 6));
                     let message = format!("body:strain_percentile: expected percent, got {given}; did you mean {meant}?");
                     return Err(fail(lua, message));
@@ -499,7 +504,7 @@ class! {
         label(_) { "solid".to_owned() }
         methods {
             /// Prescribes the pose after the next step: position, m, and orientation as axis-angle, rad (none by
-            /// default). To move it into a soft body by more than half of the body's thickness in one step is an error.
+            /// default). A step that moves it through a soft body, or more than 1 mm into it, is an error.
             fn move_to(lua, this, position: [f64; 3] = POSITION, axis_angle: Option<[f64; 3]> = AXIS_ANGLE) -> [] {
                 let Some(id) = this.kinematic else {
                     let message = "solid:move_to: a static solid cannot move; make it with world:kinematic";

@@ -42,7 +42,7 @@ use softvt_benchmark::{
 };
 use softvt_common::{
     parallel::lock,
-    text::{format_number, unknown_name},
+    text::{exact_number, unknown_name},
 };
 
 /// Kind of the main file of a script.
@@ -515,7 +515,7 @@ fn task(lua: &Lua, id: usize, spec: &Constructed<TaskSpec>, budget: u32) -> mlua
         if let Goal::Turned { range: [low, high], .. } = goal
             && low > high
         {
-            let [low, high] = [low, high].map(|value| format_number(*value));
+            let [low, high] = [low, high].map(|value| exact_number(*value));
             let message =
                 format!("task.goal.range: the lowest value {low} is above the highest, {high}; swap them");
             return Err(fail_at_key(lua, table, "range", message));

@@ -20,7 +20,7 @@ use crate::{
 };
 use softvt_common::{
     parallel::lock,
-    text::{format_number, suggest},
+    text::{exact_number, suggest},
 };
 
 record! {
@@ -335,7 +335,7 @@ fn declare(lua: &Lua, session: &mut OptionSession, key: &Value, value: &Value) -
     if let (Some(min), Some(max)) = (record.min, record.max)
         && min > max
     {
-        let message = format!("{} is above max, {}; swap them", format_number(min), format_number(max));
+        let message = format!("{} is above max, {}; swap them", exact_number(min), exact_number(max));
         let error = ValidationError::new(message).inside("min").inside(spec.name.clone());
         return Err(error_at_key(lua, "options", &error));
     }
