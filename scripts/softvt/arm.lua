@@ -54,8 +54,7 @@ local function travel(self, pose, options, closure)
   local steps = max(1, ceil(seconds / host.dt))
   self.goal = pose
   for step = 1, steps do
-    -- Of thousands of steps, the last but one may be rounded to above 1.
-    local s = min(1, smooth(step / steps))
+    local s = smooth(step / steps)
     self:command(from:interpolate(pose, s), start * (1 - s) + closure * s)
   end
   self.goal = nil

@@ -13,9 +13,7 @@ use crate::{
     ActionChunk, EpisodeBrief, Observation, PolicyError, QueryId, decode,
     encode::content,
     msgpack::{entry, map, names},
-    profile::{
-        GripCode, GripperValues, ObservationSource, PoseEncoding, Profile, ProfileInput, RobotStatePart,
-    },
+    profile::{GripCode, GripperValues, ObservationSource, PoseEncoding, Profile},
 };
 
 const VERSION: u64 = 1;

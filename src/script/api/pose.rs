@@ -15,8 +15,9 @@ pub(crate) const ANGLES: Range = Range::closed(-FULL_TURN, FULL_TURN);
 #[expect(clippy::approx_constant, reason = "messages show it")]
 const FULL_TURN: f64 = 6.2832;
 
-/// Share of the way between two poses.
-const SHARE: Type = Type::Number("", Range::closed(0.0, 1.0));
+/// Share of the way between two poses. Sums of steps may be rounded to a little more than 1.
+const SHARE: Range = Range::closed(0.0, 1.0);
+const MAX_SHARE_ERROR: f64 = 1e-6;
 
 /// Divides the numbers by the largest magnitude, so that no square over- or underflows. `None` if that is too small or
 /// not finite.
@@ -126,7 +127,11 @@ class! {
                 LuaPose(Pose::from_parts(this.0.translation, rotation * this.0.rotation))
             }
             /// Returns a pose between this one (at a share of 0) and another (at 1).
-            fn interpolate(_, this, other: LuaPose, share: f64 = SHARE) -> ["softvt.Pose"] {
+            fn interpolate(lua, this, other: LuaPose, share: f64) -> ["softvt.Pose"] {
+                if !(-MAX_SHARE_ERROR..=1.0 + MAX_SHARE_ERROR).contains(&share) {
+                    let (expected, got) = (SHARE.describe(), SHARE.show_outside(share));
+                    return Err(fail(lua, format!("pose:interpolate: expected a share{expected}, got {got}")));
+                }
                 let at = this.0.translation.vector.lerp(&other.0.translation.vector, share);
                 // Between opposite orientations the shortest rotation is not unique, and slerp undefined.
                 let rotation = this.0.rotation.try_slerp(&other.0.rotation, share, 1e-12);
