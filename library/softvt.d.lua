@@ -1052,7 +1052,7 @@ function Body:slipping(solid) end
 ---@class softvt.Solid
 local Solid = {}
 
----Prescribes the pose after the next step: position, m, and orientation as axis-angle, rad (none by default). A step that moves it through a soft body, or more than 1 mm into it, is an error.
+---Prescribes the pose after the next step: position, m, and orientation as axis-angle, rad (none by default).
 ---@param position number[]
 ---@param axis_angle? number[]
 function Solid:move_to(position, axis_angle) end

@@ -55,7 +55,7 @@ use crate::{
 use softvt_geometry::{Pose, Vec3};
 
 pub use builders::{BodyBuilder, FixedBuilder, KinematicBuilder, RigidBodyBuilder, SoftBodyBuilder};
-pub use penetration::{Penetration, Sweep, SweepStart};
+pub use penetration::Penetration;
 pub use snapshot::{ContactPatch, Energy, PatchPoint, SampleSupport, WorldSnapshot};
 pub use state::{Articulation, BodyContact, ContactSummary, JointDrive, KinematicFrame, RigidBody, SoftBody};
 

@@ -30,7 +30,7 @@ use softvt_physics::{
     BodyId, ColliderId, ContactPartner, KinematicId, PhysicsParams, SoftId, World,
     contact::{Collider, Friction, SurfaceStiffness},
     fem::{FemState, StrainLimits, StrainMeter},
-    world::{ContactSummary, Penetration, SoftBody, StepFailure, SweepStart},
+    world::{ContactSummary, Penetration, SoftBody, StepFailure},
 };
 use softvt_robot::{PadSpec, pads::PadSurface};
 use softvt_rollout::{MAX_OVERLAP, soft_model};
@@ -159,19 +159,6 @@ impl Inner {
         let [first, second] = penetration.bodies.map(|body| self.world.partner_name(body));
         let depth = significant(1e3 * penetration.depth, 3);
         Err(fail(lua, format!("{first:?} and {second:?} overlap by {depth} mm; move them apart")))
-    }
-
-    /// Refuses a step since `start` in which a kinematic solid passed through a body.
-    fn refuse_sweep(&self, lua: &Lua, start: Option<SweepStart>) -> mlua::Result<()> {
-        let sweep = start.and_then(|start| self.world.sweep_since(&start, MAX_OVERLAP));
-        let Some(sweep) = sweep else { return Ok(()) };
-        let (solid, body) = (&self.world.collider(sweep.collider).name, &self.world.soft(sweep.body).name);
-        let [distance, limit] = [sweep.distance, sweep.limit].map(|length| significant(1e3 * length, 3));
-        let message = format!(
-            "world:step: {solid:?} moved {distance} mm in one step, through {body:?}; move it by at most {limit} mm per \
-             step (half the thickness of the body)"
-        );
-        Err(fail(lua, message))
     }
 }
 
@@ -322,16 +309,12 @@ impl LuaWorld {
             ));
         }
         let _pause = inner.clock.pause();
-        let start = inner.world.sweep_start();
         let Inner { world, timing, .. } = inner;
         let dt = world.params.dt;
         inner.failed = timing.measure(dt, || world.step()).err();
         let stats = inner.world.solver_stats();
         inner.newton_total += u64::from(stats.newton_steps);
         inner.newton_max = inner.newton_max.max(stats.max_newton_steps);
-        if inner.failed.is_none() {
-            inner.refuse_sweep(lua, start)?;
-        }
         Ok((inner.failed.is_none(), inner.failed.as_ref().map(StepFailure::to_string)))
     }
 }
@@ -504,7 +487,7 @@ class! {
         label(_) { "solid".to_owned() }
         methods {
             /// Prescribes the pose after the next step: position, m, and orientation as axis-angle, rad (none by
-            /// default). A step that moves it through a soft body, or more than 1 mm into it, is an error.
+            /// default).
             fn move_to(lua, this, position: [f64; 3] = POSITION, axis_angle: Option<[f64; 3]> = AXIS_ANGLE) -> [] {
                 let Some(id) = this.kinematic else {
                     let message = "solid:move_to: a static solid cannot move; make it with world:kinematic";
