@@ -225,10 +225,11 @@ fn joint_positions_and_widths_of_other_actions_are_reported() {
     );
     let late = with(&|demonstration| demonstration.joint_commands.rotate_right(1));
     assert!(late.contains("actions_joints: they are one control step earlier or later"), "{late}");
+    let name = "data/demo_0/actions_two_width";
+    let (_folder, path) = write(&demonstration(0.0), "task.hdf5");
+    let mut rows = H5File::open(&path).unwrap().dataset(name).unwrap().read_raw::<f64>().unwrap();
+    rows.chunks_exact_mut(7).for_each(|row| row[6] *= 0.5);
     let narrow = changed(|file| {
-        let name = "data/demo_0/actions_two_width";
-        let mut rows = file.dataset(name).unwrap().read_raw::<f64>().unwrap();
-        rows.chunks_exact_mut(7).for_each(|row| row[6] *= 0.5);
         file.delete_dataset(name).unwrap();
         let made = demo_0(file).new_dataset::<f64>().shape([STEPS, 7]).create("actions_two_width");
         made.unwrap().write_raw(&rows).unwrap();
