@@ -175,12 +175,12 @@ fn excludes(first: &Goal, other: &Goal) -> bool {
 fn implies(holds: &Goal, other: &Goal) -> bool {
     match (holds, other) {
         (Goal::Near { of, distance_m }, Goal::Near { of: same, distance_m: most }) => {
-            is_same_placement(of, same) && distance_m <= most
+            placement_implies(of, same) && distance_m <= most
         }
         (
             Goal::Beside { side, of, distance_m },
             Goal::Beside { side: another, of: same, distance_m: least },
-        ) => is_same_placement(of, same) && side == another && distance_m >= least,
+        ) => placement_implies(of, same) && side == another && distance_m >= least,
         (
             Goal::Upright { object, angle_rad, hold_s },
             Goal::Upright { object: same, angle_rad: most, hold_s: shortest },
@@ -200,7 +200,7 @@ fn implies(holds: &Goal, other: &Goal) -> bool {
 
 /// True if what holds as long as `of` asks holds as long as `other` asks: of the same object, which the robot does not
 /// touch, and the same target.
-fn is_same_placement(of: &Placement, other: &Placement) -> bool {
+fn placement_implies(of: &Placement, other: &Placement) -> bool {
     (&of.object, &of.target) == (&other.object, &other.target) && of.hold_s >= other.hold_s
 }
 

@@ -219,7 +219,7 @@ mod tests {
     }
 
     #[test]
-    fn a_value_that_needs_an_equals_sign_is_told_so() {
+    fn a_value_that_needs_an_equals_sign_has_a_message_of_its_own() {
         let message = |words: &str| {
             let words: Vec<String> = words.split(' ').map(str::to_owned).collect();
             flag_without_equals(&clap_command(), &words)

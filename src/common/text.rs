@@ -9,7 +9,7 @@ pub const MAX_TEXT_BYTES: usize = 4096;
 pub const AXIS_NAMES: [&str; 3] = ["x", "y", "z"];
 
 /// Formats a number for a message, in decimal, or in scientific notation if it is below 1e-6 or at least 1e9 in
-/// magnitude. Of a number with more than nine digits, which arithmetic gives and hardly anybody writes, six are kept.
+/// magnitude. A number with more than nine digits is a computed one: six of them are kept.
 pub fn format_number(x: f64) -> String {
     const WRITTEN_DIGITS: usize = 9;
     let exact = exact_number(x);

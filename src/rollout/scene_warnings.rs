@@ -49,7 +49,7 @@ pub fn scene_warnings(task: &Task, scene: &Scene, cache: &AssetCache) -> BTreeSe
     all
 }
 
-/// Budget below which no manipulation is possible, control steps: the hand shuts in about as many.
+/// Budget below which no manipulation is possible, control steps: the hand closes in about as many.
 const MIN_BUDGET_STEPS: u32 = 10;
 
 /// A warning about a task whose budget ends before its goal can have held, or before an arm can have done anything.

@@ -17,6 +17,16 @@ pub(crate) fn is_finite(pose: &Pose) -> bool {
     pose.translation.vector.iter().chain(pose.rotation.coords.iter()).all(|x| x.is_finite())
 }
 
+/// The lower of two numbers. A comparison is one instruction, unlike `f32::min`.
+pub(crate) fn lower(a: f32, b: f32) -> f32 {
+    if b < a { b } else { a }
+}
+
+/// The higher of two numbers, as [`lower`].
+pub(crate) fn higher(a: f32, b: f32) -> f32 {
+    if b > a { b } else { a }
+}
+
 /// Number of points shaded at once.
 pub(crate) const LANES: usize = 8;
 

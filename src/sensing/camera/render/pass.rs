@@ -4,7 +4,7 @@ use super::{interpolate::MeshInstance, moving::MovingObjects};
 use crate::camera::{
     error::CameraError,
     lens::Lens,
-    math::{V3, Vec3x8, f32x8},
+    math::{V3, Vec3x8, f32x8, higher, lower},
     raster::{TileBins, first_triangle_id, object_index, triangle_index},
     scene::{FrameView, RenderObject, RenderScene},
     shade::{
@@ -28,9 +28,8 @@ pub(crate) fn bounds_of(points: impl IntoIterator<Item = V3>) -> Bounds {
     let mut bounds = [V3::repeat(f32::MAX), V3::repeat(f32::MIN)];
     for p in points {
         for axis in 0..3 {
-            // Unlike `f32::min`, a comparison is one instruction: coordinates are numbers.
-            bounds[0][axis] = if p[axis] < bounds[0][axis] { p[axis] } else { bounds[0][axis] };
-            bounds[1][axis] = if p[axis] > bounds[1][axis] { p[axis] } else { bounds[1][axis] };
+            bounds[0][axis] = lower(bounds[0][axis], p[axis]);
+            bounds[1][axis] = higher(bounds[1][axis], p[axis]);
         }
     }
     bounds

@@ -249,12 +249,15 @@ impl ShadedRows for TriangleRows<'_, '_, '_> {
     }
 
     fn interpolate(&mut self, row: usize, start: &TriangleLight, end: &TriangleLight, share: f32) {
+        if self.triangle.is_textured_metal() {
+            self.evaluate(row);
+            return;
+        }
         let footprint = mix(start.footprint, end.footprint, share);
         let (albedo, roughness) =
             self.triangle.row_material(self.pass.lens, self.run.position(row), footprint);
         let deviation = (roughness - mix(start.roughness, end.roughness, share)).abs();
-        if deviation.simd_gt(f32x8::splat(MAX_ROUGHNESS_DEVIATION)).any() || self.triangle.is_textured_metal()
-        {
+        if deviation.simd_gt(f32x8::splat(MAX_ROUGHNESS_DEVIATION)).any() {
             self.evaluate(row);
             return;
         }

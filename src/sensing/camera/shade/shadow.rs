@@ -7,7 +7,7 @@
 use wide::i32x8;
 
 use crate::camera::{
-    math::{LANE_INDEX, LANES, V3, Vec3x8, f32x8, sum_lanes},
+    math::{LANE_INDEX, LANES, V3, Vec3x8, f32x8, higher, lower, sum_lanes},
     raster::HeightBuffer,
 };
 use softvt_geometry::basis_from_reference;
@@ -304,16 +304,6 @@ impl ShadowMap {
             interpolate_run(nodes)
         }
     }
-}
-
-/// The lower of two numbers: one instruction, unlike `f32::min`.
-fn lower(a: f32, b: f32) -> f32 {
-    if b < a { b } else { a }
-}
-
-/// The higher of two numbers.
-fn higher(a: f32, b: f32) -> f32 {
-    if b > a { b } else { a }
 }
 
 /// Writes the extreme value of the tiles around each tile, up to `REACH` away, for some rows. `extreme` is the lower or
