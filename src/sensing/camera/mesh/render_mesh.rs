@@ -358,6 +358,11 @@ impl ShapeSurface {
             let max_edge =
                 self.voxels.as_ref().map_or(f32::MAX, |voxels| (MAX_SOFT_EDGE * voxels.edge) as f32);
             lod = simplify(&lod, SIMPLIFY_TOLERANCE * lod.vertex_spacing, max_edge);
+            if self.voxels.is_some() {
+                let of_triangles = vertex_normals(&lod.positions, &lod.triangles);
+                lod.relative_normals =
+                    RelativeNormal::of_vertices(&lod.positions, &lod.triangles, &lod.normals, &of_triangles);
+            }
         }
         self.embed(lod)
     }
@@ -415,10 +420,7 @@ impl ShapeSurface {
             name: self.name.clone(),
             reason: "its surface lies outside of its voxel mesh; build both from one shape".to_owned(),
         };
-        let of_triangles = vertex_normals(&lod.positions, &lod.triangles);
-        let relative_normals =
-            RelativeNormal::of_vertices(&lod.positions, &lod.triangles, &lod.normals, &of_triangles);
-        Ok(Lod { embedding: embedding.ok_or_else(outside)?, relative_normals, ..lod })
+        Ok(Lod { embedding: embedding.ok_or_else(outside)?, ..lod })
     }
 }
 

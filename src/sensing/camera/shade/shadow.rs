@@ -42,17 +42,17 @@ const MAX_RADIUS: f32 = 7.4;
 const MIN_RADIUS: f32 = 1.5;
 /// Maximum radius of a filter one vector wide, texels.
 const MAX_RADIUS_ONE_VECTOR: f32 = 3.4;
-/// Maximum length of a run of eight points, texels, that is interpolated from [`RUN_NODES`]: the
-/// filter is smooth enough.
-const INTERPOLATED_RUN: f32 = 4.0;
-/// Maximum length of a run, texels, whose nodes decide whether all of it is fully lit or fully dark.
-const UNIFORM_RUN: f32 = 7.0;
-/// Points of a run that are always filtered.
-const RUN_NODES: [usize; 4] = [0, 2, 5, 7];
-/// Maximum deviation of the points of a run from equal spacing, texels.
-const MAX_RUN_DEVIATION: f32 = 0.3;
-/// Minimum cosine between the normals of a run.
-const MIN_RUN_COSINE: f32 = 0.998;
+/// Maximum distance, texels, of points between which all are fully lit or fully dark if both ends are: filters around
+/// both ends overlap or leave a gap of less than two texels.
+const MAX_UNIFORM_DISTANCE: f32 = 4.6;
+/// Maximum distance, texels, of points between which visibility is interpolated: steps are about as wide as this.
+const MAX_LINEAR_DISTANCE: f32 = 2.5;
+/// Maximum difference of visibility from its interpolation.
+const MAX_LINEAR_DEVIATION: f32 = 0.03;
+/// Maximum distance of neighbouring points from the plane of one of them, m.
+const MAX_PLANE_DISTANCE: f32 = 4e-3;
+/// Minimum cosine between the normals of neighbouring points.
+const MIN_NEIGHBOUR_COSINE: f32 = 0.9;
 /// Minimum sine of the light's elevation; flatter light is clamped.
 const MIN_ELEVATION_SINE: f32 = 0.15;
 /// Height of empty texels, m.
@@ -288,20 +288,82 @@ impl ShadowMap {
             };
             receiver.visibility(self.ranges.around(tiles[i], own_height[i]))
         };
-        let run_length = if occluded == 0xFF { run_length(at, n, slopes.map(|s| s[0])) } else { f32::MAX };
-        if run_length > UNIFORM_RUN {
-            let lane = |i: usize| if occluded >> i & 1 == 1 { filter(i) } else { 1.0 };
-            return f32x8::new(std::array::from_fn(lane));
+        // Bit masks of the points at most `distance` texels away from point `i` on one smooth surface.
+        let neighbours = |i: usize| -> [u32; 2] {
+            let from = |x: f32x8| x - f32x8::splat(x.to_array()[i]);
+            let (du, dv) = (from(at.u), from(at.v));
+            let rise = du * f32x8::splat(slopes[0][i]) + dv * f32x8::splat(slopes[1][i]);
+            let own_normal = n.to_arrays().map(|axis| f32x8::splat(axis[i]));
+            let own_normal = Vec3x8 { x: own_normal[0], y: own_normal[1], z: own_normal[2] };
+            let is_smooth = (from(at.height) - rise).abs().simd_lt(f32x8::splat(MAX_PLANE_DISTANCE))
+                & n.dot(own_normal).simd_gt(f32x8::splat(MIN_NEIGHBOUR_COSINE));
+            [MAX_UNIFORM_DISTANCE, MAX_LINEAR_DISTANCE].map(|distance| {
+                let is_near = |d: f32x8| d.abs().simd_le(f32x8::splat(distance));
+                (is_smooth & is_near(du) & is_near(dv)).to_bitmask()
+            })
+        };
+        let mut points = PointSequence { occluded, neighbours, filter, visible: [1.0; LANES] };
+        points.evaluate(0);
+        points.evaluate(LANES - 1);
+        points.fill(0, LANES - 1);
+        f32x8::new(points.visible)
+    }
+}
+
+/// Eight points, of which neighbours often lie next to each other on one surface.
+struct PointSequence<N, F> {
+    /// Bit mask of the points that are filtered; the others are lit.
+    occluded: u32,
+    /// Bit masks of the points at most [`MAX_UNIFORM_DISTANCE`] and [`MAX_LINEAR_DISTANCE`] away from a point on one
+    /// smooth surface.
+    neighbours: N,
+    /// Visible fraction at a point.
+    filter: F,
+    /// Visible fractions.
+    visible: [f32; LANES],
+}
+
+impl<N: Fn(usize) -> [u32; 2], F: Fn(usize) -> f32> PointSequence<N, F> {
+    fn evaluate(&mut self, i: usize) {
+        if self.occluded >> i & 1 == 1 {
+            self.visible[i] = (self.filter)(i);
         }
-        let nodes @ [a, b, c, d] = RUN_NODES.map(filter);
-        // The filter is wider than the gaps between the nodes, so it would also find an occluder narrower than a gap.
-        if nodes == [0.0; 4] || nodes == [1.0; 4] {
-            return f32x8::splat(a);
+    }
+
+    /// Finds the visible fractions between two points at which it is known.
+    fn fill(&mut self, first: usize, last: usize) {
+        let between = (1 << last) - (2 << first);
+        if between & self.occluded == 0 {
+            return;
         }
-        if run_length > INTERPOLATED_RUN {
-            f32x8::new([a, filter(1), b, filter(3), filter(4), c, filter(6), d])
-        } else {
-            interpolate_run(nodes)
+        let (start, end) = (self.visible[first], self.visible[last]);
+        let is_uniform = start == end && (start == 0.0 || start == 1.0);
+        let with_last = between | 1 << last;
+        let [is_close, is_closer] = (self.neighbours)(first).map(|near| with_last & !near == 0);
+        if is_uniform && is_close {
+            self.interpolate(first, last);
+            return;
+        }
+        let middle = usize::midpoint(first, last);
+        self.evaluate(middle);
+        if is_closer && last - first > 2 {
+            let share = (middle - first) as f32 / (last - first) as f32;
+            let is_linear =
+                (self.visible[middle] - (start + (end - start) * share)).abs() < MAX_LINEAR_DEVIATION;
+            if is_linear {
+                self.interpolate(first, middle);
+                self.interpolate(middle, last);
+                return;
+            }
+        }
+        self.fill(first, middle);
+        self.fill(middle, last);
+    }
+
+    fn interpolate(&mut self, first: usize, last: usize) {
+        let (start, end) = (self.visible[first], self.visible[last]);
+        for i in (first + 1..last).filter(|i| self.occluded >> i & 1 == 1) {
+            self.visible[i] = start + (end - start) * ((i - first) as f32 / (last - first) as f32);
         }
     }
 }
@@ -335,39 +397,6 @@ fn dilate<const REACH: usize>(
     }
 }
 
-/// Interpolates a run of eight values by the cubic through those at [`RUN_NODES`].
-fn interpolate_run(values: [f32; 4]) -> f32x8 {
-    let nodes = RUN_NODES.map(|node| f32x8::splat(node as f32));
-    let mut sum = f32x8::ZERO;
-    for (i, value) in values.into_iter().enumerate() {
-        let mut term = f32x8::splat(value);
-        for j in (0..RUN_NODES.len()).filter(|&j| j != i) {
-            term *= (LANE_INDEX - nodes[j]) * f32x8::splat(1.0 / (RUN_NODES[i] as f32 - RUN_NODES[j] as f32));
-        }
-        sum += term;
-    }
-    sum.fast_max(f32x8::ZERO).fast_min(f32x8::ONE)
-}
-
-/// Length in texels of the line on which points of normals `n` are equally spaced on one plane; `f32::MAX` if they are
-/// not. `slope` is the rise of the plane per texel along u and v, m.
-fn run_length(at: &LightSpacePoints, n: &Vec3x8, slope: [f32; 2]) -> f32 {
-    let extents = [at.u, at.v].map(|x| {
-        let [first, .., last] = x.to_array();
-        let line = f32x8::splat(first) + LANE_INDEX * f32x8::splat((last - first) / (LANES - 1) as f32);
-        let is_even = (x - line).abs().simd_lt(f32x8::splat(MAX_RUN_DEVIATION)).all();
-        if is_even { (last - first).abs() } else { f32::MAX }
-    });
-    let from_first = |x: f32x8| x - f32x8::splat(x.to_array()[0]);
-    let plane = f32x8::splat(at.height.to_array()[0])
-        + from_first(at.u) * f32x8::splat(slope[0])
-        + from_first(at.v) * f32x8::splat(slope[1]);
-    let on_plane = (at.height - plane).abs().simd_lt(f32x8::splat(DEPTH_BIAS)).all();
-    let first_normal = V3::from(n.to_arrays().map(|axis| axis[0]));
-    let is_flat = n.dot(Vec3x8::splat(&first_normal)).simd_gt(f32x8::splat(MIN_RUN_COSINE)).all();
-    if is_flat && on_plane { extents[0].max(extents[1]) } else { f32::MAX }
-}
-
 /// Percentage-closer filter around one receiver.
 ///
 /// Only occluders within the cone of the lamp count: an offset to the side larger than height × lamp width is
@@ -386,12 +415,14 @@ struct PenumbraFilter<'a> {
     cone: f32,
 }
 
-/// Weighted sums over the texels around a receiver.
-struct FilterSums {
-    lit: f32,
-    occluded: f32,
-    /// Of occluders: weight × height above the receiver, m.
-    occluder_height: f32,
+/// Occluders around a receiver.
+struct Occluders {
+    /// Sum of their weights; zero without any.
+    weight: f32,
+    /// Sum of weight × height above the receiver, m.
+    weighted_height: f32,
+    /// True if any texel of the search does not occlude.
+    is_partial: bool,
 }
 
 impl PenumbraFilter<'_> {
@@ -413,84 +444,206 @@ impl PenumbraFilter<'_> {
             }
             search_radius = radius_below(range.near_max);
         }
-        let search = match search_radius {
-            ..=MAX_RADIUS_ONE_VECTOR => self.sums::<1, 1, true>(search_radius),
-            _ => self.sums::<2, 2, true>(search_radius),
+        let occluders = match search_radius {
+            ..=MAX_RADIUS_ONE_VECTOR => self.occluders::<1, 1>(search_radius),
+            _ => self.occluders::<2, 2>(search_radius),
         };
-        if search.occluded <= 0.0 {
+        if occluders.weight <= 0.0 {
             return 1.0;
         }
-        if search.lit <= 0.0 {
+        if !occluders.is_partial {
             return 0.0;
         }
-        let mean_height = search.occluder_height / search.occluded;
+        let mean_height = occluders.weighted_height / occluders.weight;
         let radius = (mean_height * self.cone).clamp(MIN_RADIUS, search_radius);
-        let filtered = match radius {
-            ..=MAX_RADIUS_ONE_VECTOR => self.sums::<1, 1, false>(radius),
-            _ => self.sums::<2, 2, false>(radius),
-        };
-        if filtered.occluded <= 0.0 { 1.0 } else { filtered.lit / (filtered.lit + filtered.occluded) }
+        match radius {
+            ..=MAX_RADIUS_ONE_VECTOR => self.lit_share::<1, 1>(radius),
+            _ => self.lit_share::<2, 2>(radius),
+        }
     }
 
-    /// Sums over a disc of `radius` texels, `CHUNKS` vectors wide, in every `STEP`th row.
+    /// Occluders in a square of half-width `radius`, texels, `CHUNKS` vectors wide, in every `STEP`th row.
     ///
-    /// A `SEARCH` weighs occluders by the lamp's cone alone, so that the result does not depend on the search radius.
+    /// They are weighed by the lamp's cone alone, so that the result does not depend on the radius.
     #[inline(always)]
-    fn sums<const CHUNKS: usize, const STEP: usize, const SEARCH: bool>(&self, radius: f32) -> FilterSums {
-        let [u, v, height] = self.position;
-        // Conversions by way of `i32` take a few instructions less.
-        let first = (u - radius) as i32 as usize;
-        let (from, to) = ((v - radius) as i32 as usize, (v + radius) as i32 as usize + 1);
-        let inverse2 = 1.0 / (radius * radius);
-        let du: [f32x8; CHUNKS] =
-            std::array::from_fn(|c| LANE_INDEX + f32x8::splat((first + c * LANES) as f32 + 0.5 - u));
-        let du2 = du.map(|d| d * d);
-        // The product of two parabolas: smoother than a box, and separable.
-        let weights = du2.map(|d2| (f32x8::ONE - d2 * f32x8::splat(inverse2)).fast_max(f32x8::ZERO));
-        let plane_rise = du.map(|d| d * f32x8::splat(self.slope[0]));
-        let plane_height = du.map(|d| d * f32x8::splat(self.clamped_slope[0]) + f32x8::splat(height));
-        let limit = f32x8::splat(height + self.bias);
-        let [cone, min_radius] = [self.cone, MIN_RADIUS].map(f32x8::splat);
-        let max_reach = f32x8::splat(if SEARCH { radius } else { f32::MAX });
-        let (mut lit, mut occluded, mut occluder_height) = (f32x8::ZERO, f32x8::ZERO, f32x8::ZERO);
-        let stride = self.map.texels.stride();
+    fn occluders<const CHUNKS: usize, const STEP: usize>(&self, radius: f32) -> Occluders {
+        let window = FilterWindow::<CHUNKS>::new(self, radius);
+        let in_range: [u32; CHUNKS] = window.du.map(|d| d.abs().simd_lt(f32x8::splat(radius)).to_bitmask());
+        let (mut weight, mut weighted_height) = (f32x8::ZERO, f32x8::ZERO);
+        let (mut is_partial, mut has_occluders) = (false, false);
         // Counters and ranges of texels in place of iterators, which take as long as the sums.
-        let mut row = from.next_multiple_of(STEP);
-        while row < to {
-            let dv = row as f32 + 0.5 - v;
-            let row_weight = f32x8::splat((1.0 - dv * dv * inverse2).max(0.0));
-            let [row_rise, row_height, dv2] =
-                [self.slope[1] * dv, self.clamped_slope[1] * dv, dv * dv].map(f32x8::splat);
-            let at = row * stride + first;
+        let mut row = window.rows[0].next_multiple_of(STEP);
+        while row < window.rows[1] {
+            let dv = row as f32 + 0.5 - self.position[1];
+            let row_rise = f32x8::splat(self.slope[1] * dv);
+            let Some(texels) = window.texels(self.map, row) else { break };
             row += STEP;
-            let Some(texels) = self.map.texels.heights.get(at..at + CHUNKS * LANES) else { break };
-            let texels = texels.as_chunks::<LANES>().0;
+            for c in 0..CHUNKS {
+                let heights = f32x8::new(texels[c]);
+                let is_higher = window.is_higher(c, heights, row_rise);
+                let higher = is_higher.to_bitmask();
+                is_partial |= in_range[c] & !higher != 0 && dv.abs() < radius;
+                if higher != 0 {
+                    has_occluders = true;
+                    let [rise, within] = window.occlusion(self, c, heights, dv, radius);
+                    let within = is_higher & within;
+                    weight += within;
+                    weighted_height += within * rise;
+                }
+            }
+        }
+        if !has_occluders {
+            return Occluders { weight: 0.0, weighted_height: 0.0, is_partial };
+        }
+        Occluders { weight: sum_lanes(weight), weighted_height: sum_lanes(weighted_height), is_partial }
+    }
+
+    /// Share of the light that passes, by a filter of `radius` texels, `CHUNKS` vectors wide, in every `STEP`th row.
+    #[inline(always)]
+    fn lit_share<const CHUNKS: usize, const STEP: usize>(&self, radius: f32) -> f32 {
+        let window = FilterWindow::<CHUNKS>::new(self, radius);
+        let inverse2 = 1.0 / (radius * radius);
+        // The product of two parabolas: smoother than a box, and separable.
+        let weights = window.du.map(|d| (f32x8::ONE - d * d * f32x8::splat(inverse2)).fast_max(f32x8::ZERO));
+        let (mut lit, mut occluded) = (f32x8::ZERO, f32x8::ZERO);
+        let mut row = window.rows[0].next_multiple_of(STEP);
+        while row < window.rows[1] {
+            let dv = row as f32 + 0.5 - self.position[1];
+            let row_weight = f32x8::splat((1.0 - dv * dv * inverse2).max(0.0));
+            let row_rise = f32x8::splat(self.slope[1] * dv);
+            let Some(texels) = window.texels(self.map, row) else { break };
+            row += STEP;
             for c in 0..CHUNKS {
                 let heights = f32x8::new(texels[c]);
                 let weight = weights[c] * row_weight;
-                let is_higher = heights.simd_gt(limit + (plane_rise[c] + row_rise).fast_max(f32x8::ZERO));
+                let is_higher = window.is_higher(c, heights, row_rise);
                 if !is_higher.any() {
                     lit += weight;
                     continue;
                 }
                 lit += weight & !is_higher;
-                let rise = heights - plane_height[c] - row_height;
-                let reach = (rise * cone + min_radius).fast_min(max_reach);
-                // Full weight inside the cone, which fades out towards its border.
-                let within = (reach * reach - du2[c] - dv2) * f32x8::splat(1.0 / (MIN_RADIUS * MIN_RADIUS));
-                let within = is_higher & within.fast_max(f32x8::ZERO).fast_min(f32x8::ONE);
-                if SEARCH {
-                    occluded += within;
-                    occluder_height += within * rise;
-                } else {
-                    occluded += weight * within;
-                }
+                let [_, within] = window.occlusion(self, c, heights, dv, f32::MAX);
+                occluded += weight * (is_higher & within);
             }
         }
-        FilterSums {
-            lit: sum_lanes(lit),
-            occluded: sum_lanes(occluded),
-            occluder_height: sum_lanes(occluder_height),
+        let (lit, occluded) = (sum_lanes(lit), sum_lanes(occluded));
+        if occluded <= 0.0 { 1.0 } else { lit / (lit + occluded) }
+    }
+}
+
+/// The texels around a receiver, some vectors of columns wide.
+struct FilterWindow<const CHUNKS: usize> {
+    first_column: usize,
+    /// First row, and the end of the last one.
+    rows: [usize; 2],
+    /// Columns relative to the receiver, texels.
+    du: [f32x8; CHUNKS],
+    /// Rise of the receiver's plane from the receiver to the columns, m.
+    plane_rise: [f32x8; CHUNKS],
+    /// Heights that exceed this by more than the rise of the plane occlude, m.
+    limit: f32x8,
+}
+
+impl<const CHUNKS: usize> FilterWindow<CHUNKS> {
+    #[inline(always)]
+    fn new(receiver: &PenumbraFilter, radius: f32) -> Self {
+        let [u, v, height] = receiver.position;
+        // Conversions by way of `i32` take a few instructions less.
+        let first_column = (u - radius) as i32 as usize;
+        let rows = [(v - radius) as i32 as usize, (v + radius) as i32 as usize + 1];
+        let du =
+            std::array::from_fn(|c| LANE_INDEX + f32x8::splat((first_column + c * LANES) as f32 + 0.5 - u));
+        Self {
+            first_column,
+            rows,
+            du,
+            plane_rise: du.map(|d| d * f32x8::splat(receiver.slope[0])),
+            limit: f32x8::splat(height + receiver.bias),
         }
+    }
+
+    #[inline(always)]
+    fn texels<'m>(&self, map: &'m ShadowMap, row: usize) -> Option<&'m [[f32; LANES]]> {
+        let at = row * map.texels.stride() + self.first_column;
+        Some(map.texels.heights.get(at..at + CHUNKS * LANES)?.as_chunks::<LANES>().0)
+    }
+
+    /// Mask of the heights in the columns of chunk `c` that occlude; `row_rise` is the rise of the plane to the row.
+    #[inline(always)]
+    fn is_higher(&self, c: usize, heights: f32x8, row_rise: f32x8) -> f32x8 {
+        heights.simd_gt(self.limit + (self.plane_rise[c] + row_rise).fast_max(f32x8::ZERO))
+    }
+
+    /// Heights above the receiver's clamped plane, and the share of each within the lamp's cone, of a radius of at most
+    /// `max_reach` texels.
+    #[inline(always)]
+    fn occlusion(
+        &self,
+        of: &PenumbraFilter,
+        c: usize,
+        heights: f32x8,
+        dv: f32,
+        max_reach: f32,
+    ) -> [f32x8; 2] {
+        let column_height = self.du[c] * f32x8::splat(of.clamped_slope[0]) + f32x8::splat(of.position[2]);
+        let rise = heights - column_height - f32x8::splat(of.clamped_slope[1] * dv);
+        let reach =
+            (rise * f32x8::splat(of.cone) + f32x8::splat(MIN_RADIUS)).fast_min(f32x8::splat(max_reach));
+        // Full weight inside the cone, which fades out towards its border.
+        let within = (reach * reach - self.du[c] * self.du[c] - f32x8::splat(dv * dv))
+            * f32x8::splat(1.0 / (MIN_RADIUS * MIN_RADIUS));
+        [rise, within.fast_max(f32x8::ZERO).fast_min(f32x8::ONE)]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Fills eight points of these visible fractions, all neighbours up to `reach` points away. Returns the result and
+    /// the number of points that were filtered.
+    fn fill(of: [f32; LANES], occluded: u32, reach: [usize; 2]) -> ([f32; LANES], usize) {
+        let count = std::cell::Cell::new(0);
+        let neighbours = |i: usize| {
+            reach.map(|reach| (0..LANES).filter(|j| j.abs_diff(i) <= reach).fold(0, |bits, j| bits | 1 << j))
+        };
+        let filter = |i: usize| {
+            count.set(count.get() + 1);
+            of[i]
+        };
+        let mut points = PointSequence { occluded, neighbours, filter, visible: [1.0; LANES] };
+        points.evaluate(0);
+        points.evaluate(LANES - 1);
+        points.fill(0, LANES - 1);
+        (points.visible, count.get())
+    }
+
+    #[test]
+    fn points_between_fully_lit_or_dark_neighbours_are_not_filtered() {
+        assert_eq!(fill([0.0; LANES], 0xFF, [7, 0]), ([0.0; LANES], 2));
+        assert_eq!(fill([1.0; LANES], 0xFF, [7, 0]), ([1.0; LANES], 2));
+        assert_eq!(fill([0.0; LANES], 0xFF, [4, 0]), ([0.0; LANES], 3));
+        let step = [0.0, 0.0, 0.0, 0.0, 0.4, 1.0, 1.0, 1.0];
+        let (visible, count) = fill(step, 0xFF, [7, 0]);
+        assert_eq!(visible, step);
+        assert!(count < LANES, "{count}");
+    }
+
+    #[test]
+    fn visibility_is_interpolated_only_where_it_is_linear() {
+        let slope = std::array::from_fn(|i| 0.1 + 0.1 * i as f32);
+        let (visible, count) = fill(slope, 0xFF, [7, 7]);
+        assert!(visible.iter().zip(slope).all(|(a, b)| (a - b).abs() < 1e-6), "{visible:?}");
+        assert_eq!(count, 3);
+        let bend = [0.0, 0.0, 0.0, 0.1, 0.3, 0.6, 0.8, 0.9];
+        assert_eq!(fill(bend, 0xFF, [7, 7]).0, bend);
+    }
+
+    #[test]
+    fn points_that_are_not_neighbours_are_all_filtered_and_points_without_occluders_are_lit() {
+        let mixed = [0.0, 0.2, 0.9, 0.0, 1.0, 0.5, 0.3, 0.0];
+        assert_eq!(fill(mixed, 0xFF, [0, 0]), (mixed, LANES));
+        assert_eq!(fill([0.0; LANES], 0b1010_0001, [0, 0]).0, [0.0, 1.0, 1.0, 1.0, 1.0, 0.0, 1.0, 0.0]);
+        assert_eq!(fill([0.0; LANES], 0b1001_0001, [7, 7]).0, [0.0, 1.0, 1.0, 1.0, 0.0, 1.0, 1.0, 0.0]);
     }
 }

@@ -201,25 +201,30 @@ fn grey_level(value: f32) -> u8 {
 /// Image of a cosine series per channel, 320 × 240 RGB.
 fn cosine_series(series: &[Vec<Vec<f64>>; 3]) -> Vec<f32> {
     let [width, height] = IMAGE_SIZE;
-    let wave = |n: usize, p: usize, of: usize| {
-        (std::f64::consts::PI * n as f64 * (p as f64 + 0.5) / of as f64).cos()
-    };
+    let rows = || series.iter().flatten();
+    let along_x = cosine_waves(rows().map(Vec::len).max().unwrap_or(0), width);
+    let along_y = cosine_waves(series.iter().map(Vec::len).max().unwrap_or(0), height);
     let mut out = vec![0.0; 3 * width * height];
     for (channel, rows) in series.iter().enumerate() {
         for y in 0..height {
-            let most = rows.iter().map(Vec::len).max().unwrap_or(0);
-            let mut line = vec![0.0; most];
-            for (j, row) in rows.iter().enumerate() {
-                let w = wave(j, y, height);
-                line.iter_mut().zip(row).for_each(|(sum, c)| *sum += w * c);
+            let mut line = vec![0.0; along_x.len()];
+            for (row, wave) in rows.iter().zip(&along_y) {
+                line.iter_mut().zip(row).for_each(|(sum, c)| *sum += wave[y] * c);
             }
             for x in 0..width {
-                let value: f64 = line.iter().enumerate().map(|(i, c)| c * wave(i, x, width)).sum();
+                let value: f64 = line.iter().zip(&along_x).map(|(c, wave)| c * wave[x]).sum();
                 out[3 * (y * width + x) + channel] = value as f32;
             }
         }
     }
     out
+}
+
+/// Cosine waves of the orders 0 to `count`, at the centres of `pixels` pixels.
+fn cosine_waves(count: usize, pixels: usize) -> Vec<Vec<f64>> {
+    let wave =
+        |n: usize, p: usize| (std::f64::consts::PI * n as f64 * (p as f64 + 0.5) / pixels as f64).cos();
+    (0..count).map(|n| (0..pixels).map(|p| wave(n, p)).collect()).collect()
 }
 
 #[cfg(test)]
