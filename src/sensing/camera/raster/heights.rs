@@ -23,15 +23,20 @@ impl HeightBuffer {
     pub(crate) fn new(edge: usize, height: f32) -> Self {
         Self {
             edge,
-            heights: vec![height; edge * (edge + LANES)],
+            heights: vec![height; edge * Self::stride_of(edge)],
             drawn_rows: [edge, 0],
             drawn_columns: [edge, 0],
         }
     }
 
+    /// Length of a row in memory, of a buffer of this edge.
+    pub(crate) const fn stride_of(edge: usize) -> usize {
+        edge + LANES
+    }
+
     /// Length of a row in memory.
     pub(crate) fn stride(&self) -> usize {
-        self.edge + LANES
+        Self::stride_of(self.edge)
     }
 
     /// Clears the rows and columns that were drawn to.

@@ -19,6 +19,8 @@ const INNER: usize = 512;
 const MARGIN: usize = 16;
 /// Edge of the whole map, texels.
 const EDGE: usize = INNER + 2 * MARGIN;
+/// Length of a row of the map in memory.
+const STRIDE: usize = HeightBuffer::stride_of(EDGE);
 /// Edge of the tiles that store ranges of heights, texels.
 const TILE: usize = 1 << TILE_BITS;
 const TILE_BITS: i32 = 2;
@@ -471,27 +473,25 @@ impl PenumbraFilter<'_> {
         let in_range: [u32; CHUNKS] = window.du.map(|d| d.abs().simd_lt(f32x8::splat(radius)).to_bitmask());
         let (mut weight, mut weighted_height) = (f32x8::ZERO, f32x8::ZERO);
         let (mut is_partial, mut has_occluders) = (false, false);
-        // Counters and ranges of texels in place of iterators, which take as long as the sums.
-        let mut row = window.rows[0].next_multiple_of(STEP);
-        while row < window.rows[1] {
-            let dv = row as f32 + 0.5 - self.position[1];
+        window.for_each_row::<STEP>(self, |dv, texels| {
             let row_rise = f32x8::splat(self.slope[1] * dv);
-            let Some(texels) = window.texels(self.map, row) else { break };
-            row += STEP;
+            let is_row_in_range = dv.abs() < radius;
             for c in 0..CHUNKS {
                 let heights = f32x8::new(texels[c]);
                 let is_higher = window.is_higher(c, heights, row_rise);
                 let higher = is_higher.to_bitmask();
-                is_partial |= in_range[c] & !higher != 0 && dv.abs() < radius;
-                if higher != 0 {
-                    has_occluders = true;
-                    let [rise, within] = window.occlusion(self, c, heights, dv, radius);
-                    let within = is_higher & within;
-                    weight += within;
-                    weighted_height += within * rise;
+                if higher == 0 {
+                    is_partial |= is_row_in_range;
+                    continue;
                 }
+                is_partial |= in_range[c] & !higher != 0 && is_row_in_range;
+                has_occluders = true;
+                let [rise, within] = window.occlusion(self, c, heights, dv, radius);
+                let within = is_higher & within;
+                weight += within;
+                weighted_height += within * rise;
             }
-        }
+        });
         if !has_occluders {
             return Occluders { weight: 0.0, weighted_height: 0.0, is_partial };
         }
@@ -506,13 +506,9 @@ impl PenumbraFilter<'_> {
         // The product of two parabolas: smoother than a box, and separable.
         let weights = window.du.map(|d| (f32x8::ONE - d * d * f32x8::splat(inverse2)).fast_max(f32x8::ZERO));
         let (mut lit, mut occluded) = (f32x8::ZERO, f32x8::ZERO);
-        let mut row = window.rows[0].next_multiple_of(STEP);
-        while row < window.rows[1] {
-            let dv = row as f32 + 0.5 - self.position[1];
+        window.for_each_row::<STEP>(self, |dv, texels| {
             let row_weight = f32x8::splat((1.0 - dv * dv * inverse2).max(0.0));
             let row_rise = f32x8::splat(self.slope[1] * dv);
-            let Some(texels) = window.texels(self.map, row) else { break };
-            row += STEP;
             for c in 0..CHUNKS {
                 let heights = f32x8::new(texels[c]);
                 let weight = weights[c] * row_weight;
@@ -525,7 +521,7 @@ impl PenumbraFilter<'_> {
                 let [_, within] = window.occlusion(self, c, heights, dv, f32::MAX);
                 occluded += weight * (is_higher & within);
             }
-        }
+        });
         let (lit, occluded) = (sum_lanes(lit), sum_lanes(occluded));
         if occluded <= 0.0 { 1.0 } else { lit / (lit + occluded) }
     }
@@ -562,10 +558,25 @@ impl<const CHUNKS: usize> FilterWindow<CHUNKS> {
         }
     }
 
+    /// Calls `add` with the distance from the receiver, texels, and the heights of every `STEP`th row.
     #[inline(always)]
-    fn texels<'m>(&self, map: &'m ShadowMap, row: usize) -> Option<&'m [[f32; LANES]]> {
-        let at = row * map.texels.stride() + self.first_column;
-        Some(map.texels.heights.get(at..at + CHUNKS * LANES)?.as_chunks::<LANES>().0)
+    fn for_each_row<const STEP: usize>(
+        &self,
+        receiver: &PenumbraFilter,
+        mut add: impl FnMut(f32, &[[f32; LANES]; CHUNKS]),
+    ) {
+        let first = self.rows[0].next_multiple_of(STEP);
+        let heights = &receiver.map.texels.heights;
+        let mut left = heights.get(first * STRIDE + self.first_column..).unwrap_or_default();
+        let mut dv = first as f32 + 0.5 - receiver.position[1];
+        let end = self.rows[1] as f32 - receiver.position[1];
+        // A counter of rows and ranges of texels in place of iterators, which take as long as the sums.
+        while dv < end {
+            let Some(texels) = left.as_chunks::<LANES>().0.first_chunk() else { break };
+            add(dv, texels);
+            dv += STEP as f32;
+            left = left.get(STEP * STRIDE..).unwrap_or_default();
+        }
     }
 
     /// Mask of the heights in the columns of chunk `c` that occlude; `row_rise` is the rise of the plane to the row.
