@@ -16,6 +16,7 @@ use super::{
 };
 use softvt_benchmark::CONTROL_HZ;
 use softvt_media::video::VideoWriter;
+use softvt_robot::tactile::IMAGE_SIZE;
 use softvt_rollout::StateRecording;
 use softvt_scene::{Camera, STANDARD_CAMERAS};
 use softvt_sensing::{
@@ -194,8 +195,8 @@ impl ImageOutputs {
 }
 
 /// Cell of a preview, pixels: the size of a tactile image.
-const CELL_WIDTH: u32 = 320;
-const CELL_HEIGHT: u32 = 240;
+const CELL_WIDTH: u32 = IMAGE_SIZE[0] as u32;
+const CELL_HEIGHT: u32 = IMAGE_SIZE[1] as u32;
 
 /// Camera and tactile images of one state.
 #[derive(Clone, Debug)]

@@ -6,6 +6,7 @@ use softvt_geometry::{Pose, Quat, Vec3};
 use softvt_robot::{
     gripper::MAX_WIDTH,
     panda::{self, ARM_DOFS},
+    tactile::IMAGE_SIZE,
 };
 use softvt_sensing::tactile::MARKER_COUNT;
 
@@ -16,10 +17,6 @@ const SENSOR_ERROR: f64 = 2e-3;
 /// Largest distance of an object from the origin, m: another one is in another unit.
 const MAX_DISTANCE_M: f64 = 20.0;
 
-/// Width of the tactile pictures, px.
-const TACTILE_WIDTH: f64 = 320.0;
-/// Height of the tactile pictures, px.
-const TACTILE_HEIGHT: f64 = 240.0;
 /// Distance of markers from the picture that shear explains, as a share of its edge.
 const MARKER_MARGIN: f64 = 0.1;
 
@@ -234,7 +231,7 @@ impl DemoCheck<'_> {
             row.as_chunks::<2>().0.iter().any(|[x, y]| {
                 let is_beyond =
                     |at: f64, edge: f64| at < -MARKER_MARGIN * edge || at > (1.0 + MARKER_MARGIN) * edge;
-                is_beyond(*x, TACTILE_WIDTH) || is_beyond(*y, TACTILE_HEIGHT)
+                is_beyond(*x, IMAGE_SIZE[0] as f64) || is_beyond(*y, IMAGE_SIZE[1] as f64)
             })
         };
         self.add_first(
