@@ -126,6 +126,7 @@ fn wrong_goals_are_refused_at_their_line() {
     assert_snapshot!(at_once("softvt.turned { joint = 'chest.tray', range = { 0, 0.02 } }"), @r#"x.lua:12: task.goal: can never be met: "chest.tray turned to 0.06..0.08" and "chest.tray turned to 0..0.02" cannot hold at once"#);
     assert_snapshot!(error("softvt.near { object = 'block', target = 'chest', distance = 0 }"), @"x.lua:11: task.goal.distance: expected metres in 0.001..1.5, got 0");
     assert_snapshot!(error("softvt.left_of { object = 'block', target = 'chest', distance = 8 }"), @"x.lua:11: task.goal.distance: expected metres in 0..1.5, got 8");
+    assert_snapshot!(error("softvt.left_of { object = 'block', target = 'chest', side = 'right_of' }"), @"x.lua:11: task.goal.side: softvt.left_of is this side already; leave side out, or write softvt.beside");
     assert_snapshot!(error("softvt.stacked { objects = { 'block' } }"), @"x.lua:11: task.goal.objects: expected at least two objects, from the lowest on");
     assert_snapshot!(error("softvt.left_of { object = 'block' }"), @"x.lua:11: task.goal.target: missing; expected a string that is not empty");
     assert_snapshot!(error("softvt.near { object = 'block', target = 'block' }"), @r#"x.lua:11: task.goal.target: is "block", which is the object itself; name what it must reach"#);

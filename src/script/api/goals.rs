@@ -5,8 +5,8 @@ use mlua::{Function, Lua, Table, Value};
 use super::pose::ANGLES;
 use crate::{
     schema::{
-        FromChecked, HasTable, LuaType, Range, Record, RecordType, Type, Unchecked, choice, functions, make,
-        one_of, record,
+        FromChecked, HasTable, LuaType, Range, Record, RecordType, Type, Unchecked, choice, functions,
+        invalid, make, one_of, record,
     },
     vm::{error::fail, source_map::fail_at_key},
 };
@@ -218,6 +218,10 @@ fn beside(lua: &Lua, side: &str, of: &Value) -> mlua::Result<Table> {
         let message = format!("{side}: expected a table; write softvt.{side} {{ object = …, target = … }}");
         return Err(fail(lua, message));
     };
+    if !of.raw_get::<Value>("side")?.is_nil() {
+        let message = format!("softvt.{side} is this side already; leave side out, or write softvt.beside");
+        return Err(invalid(lua, BesideSpec::RECORD.label, "side", message));
+    }
     let table = lua.create_table()?;
     for entry in of.pairs::<Value, Value>() {
         let (key, value) = entry?;
