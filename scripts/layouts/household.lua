@@ -28,6 +28,35 @@ local STOVE = {
   yaw_range = 0.03,
 }
 
+-- Distance from the origin beyond which no object of a scene lies, mm.
+local FAR = 3000
+
+-- Checks a list as layouts.cabinet takes it; errors are at the line that called the function `name` of this file.
+local function check(name, objects)
+  local function wrong(place, message) error(("layouts.%s: objects%s: %s"):format(name, place, message), 5) end
+  local entry = '{ "bun", "golden_bun", -90, 230 }'
+  if type(objects) ~= "table" then wrong("", ("expected a list of objects such as %s"):format(entry)) end
+  for k, object in ipairs(objects) do
+    local place = ("[%d]"):format(k)
+    if type(object) ~= "table" then
+      wrong(place, ("expected a table; the list has a table for each object: { %s }"):format(entry))
+    end
+    local types = { "string", "string", "number", "number", yaw = "number", on = "string" }
+    for key, value in pairs(object) do
+      if type(value) ~= types[key] then
+        wrong(place, ("expected name, asset, x and y (mm) such as %s, and the fields yaw and on"):format(entry))
+      end
+    end
+    if #object ~= 4 then wrong(place, ("expected name, asset, x and y (mm) such as %s"):format(entry)) end
+    local x, y = object[3], object[4]
+    local most = math.max(math.abs(x), math.abs(y))
+    if most > 0 and most < 1 then
+      wrong(place, ("x and y are in mm, got %g, %g; did you mean %g, %g?"):format(x, y, x / mm, y / mm))
+    end
+    if most > FAR then wrong(place, ("%g, %g mm is out of the scene"):format(x, y)) end
+  end
+end
+
 -- Objects on the table, and those on others, of a list as layouts.cabinet takes it.
 local function sorted(objects)
   local on_table, on_others = {}, {}
@@ -64,6 +93,7 @@ local layouts = {}
 
 -- A table with a piece of furniture and objects.
 local function layout(name, furniture, joints, objects)
+  check(furniture.name, objects)
   local on_table, on_others = sorted(objects)
   table.insert(on_table, 1, furniture)
   return softvt.layout("household_" .. name, function(scene, rng)
@@ -91,9 +121,16 @@ end
 -- A table with a cabinet, whose top drawer is open by `open` (m). `objects` is a list of { name, asset, x, y } (mm)
 -- with the optional field yaw (rad). With the field `on`, such as "cabinet.top_drawer", an object rests on another; x,
 -- y and yaw are then in the frame of that object.
-function layouts.cabinet(name, open, objects) return layout(name, CABINET, { top_drawer = open }, objects) end
+function layouts.cabinet(name, open, objects)
+  -- No tail call: the level of errors counts this function.
+  local made = layout(name, CABINET, { top_drawer = open }, objects)
+  return made
+end
 
 -- The same with a stove, whose knob is at `angle` (rad).
-function layouts.stove(name, angle, objects) return layout(name, STOVE, { knob = angle }, objects) end
+function layouts.stove(name, angle, objects)
+  local made = layout(name, STOVE, { knob = angle }, objects)
+  return made
+end
 
 return layouts

@@ -23,7 +23,7 @@ local layouts = {}
 
 -- Two instances of `asset` in the k-th arrangement.
 function layouts.pair(asset, k)
-  local places = assert(PLACES[k], "there are five arrangements")
+  local places = PLACES[k] or error("layouts.pair: there are five arrangements, 1 to 5", 2)
   local recipe = require("assets." .. asset)
   return softvt.layout(asset .. "_pair", function(scene, rng)
     scene:add { name = "table", asset = table_top, position = { 0, 0, 0 } }

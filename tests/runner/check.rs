@@ -431,6 +431,35 @@ fn a_variation_that_changes_nothing_is_doubted() {
 }
 
 #[test]
+fn objects_of_a_kitchen_are_placed_in_mm() {
+    let of = |entries: &str| {
+        let text = format!(
+            "local layouts = require 'layouts.household'\n\
+             local layout = layouts.cabinet('c', 0, {entries})\n\
+             return softvt.suite {{ name = 's', object_type = 'deformable', tasks_differ_in = 'object', tasks = {{ softvt.task {{\n\
+             prompt = 'p', layout = layout, goal = softvt.on {{ object = 'roll', target = 'plate' }} }} }} }}"
+        );
+        Project::new(&[("x.lua", &text)])
+    };
+    let plate = "{ 'plate', 'plate', 60, 210 }";
+    let with = |roll: &str| refusal(&of(&format!("{{ {plate}, {roll} }}")));
+    assert_snapshot!(with("{ 'roll', 'small_ridged_roll', -0.2, 0.08 }"), @"x.lua:2: layouts.cabinet: objects[2]: x and y are in mm, got -0.2, 0.08; did you mean -200, 80?");
+    assert_snapshot!(with("{ 'roll', 'small_ridged_roll', -200 }"), @r#"x.lua:2: layouts.cabinet: objects[2]: expected name, asset, x and y (mm) such as { "bun", "golden_bun", -90, 230 }"#);
+    assert_snapshot!(with("{ 'roll', 'small_ridged_roll', -200, 80, yaw_range = 1 }"), @r#"x.lua:2: layouts.cabinet: objects[2]: expected name, asset, x and y (mm) such as { "bun", "golden_bun", -90, 230 }, and the fields yaw and on"#);
+    assert_snapshot!(with("{ 'roll', 'small_ridged_roll', -200, 8000 }"), @"x.lua:2: layouts.cabinet: objects[2]: -200, 8000 mm is out of the scene");
+    assert_snapshot!(refusal(&of("{ 'roll', 'small_ridged_roll', -200, 80 }")), @r#"x.lua:2: layouts.cabinet: objects[1]: expected a table; the list has a table for each object: { { "bun", "golden_bun", -90, 230 } }"#);
+    let inside = "{ 'roll', 'small_ridged_roll', 0, 0, on = 'plate' }";
+    assert!(
+        of(&format!("{{ {plate}, {inside} }}"))
+            .run("x.lua")
+            .check()
+            .is_err_and(|error| error.contains("already holds"))
+    );
+    let pair = "local _ = require('layouts.spatial_soft').pair('golden_bun', 0)";
+    assert_snapshot!(refusal(&Project::new(&[("x.lua", pair)])), @"x.lua:1: layouts.pair: there are five arrangements, 1 to 5");
+}
+
+#[test]
 fn a_wrong_name_is_told_of_the_file_that_makes_the_expert_by_a_module() {
     let expert = "expert = function(arm, scene) arm:wait(1) end";
     let text = Small::default().text();
