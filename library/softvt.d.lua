@@ -1068,7 +1068,7 @@ local Deformation = {}
 ---@class softvt.Simulation
 local Simulation = {}
 
----Runs an expert to its end. Returns false and the reason if it gave up or the physics failed.
+---Runs an expert to its end. Returns false and the reason if it gave up, as for a pose out of reach, or the physics failed.
 ---@param expert fun(arm: softvt.Arm, scene: softvt.SceneState)
 ---@return boolean
 ---@return string?

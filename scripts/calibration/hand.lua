@@ -140,7 +140,8 @@ end
 -- followed.
 local function squeeze_from(asset, first, step, rows)
   local sim = softvt.simulate { layout = single_object(asset) }
-  sim:drive(grasp_at(first))
+  local ok, why = sim:drive(grasp_at(first))
+  if not ok then error(asset.name .. ": " .. why, 0) end
   local closure, last = first, nil
   while closure <= 1 + 1e-9 do
     local row = squeeze(sim, math.min(closure, 1))

@@ -38,6 +38,30 @@ fn a_point_may_be_written_returned_and_lack_a_field() {
 }
 
 #[test]
+fn a_pose_out_of_reach_ends_a_drive_with_the_reason() {
+    let project = experiment(
+        "grid = { x = { 5, 0.1 } }, run = function(point)
+          local floor = softvt.asset { name = 'floor', shape = softvt.shape.box { size = { 1, 1, 0.1 } }, body = softvt.static {} }
+          local layout = softvt.layout('l', function(scene) scene:add { name = 'floor', asset = floor, position = { 0, 0, -0.05 } } end)
+          local sim = softvt.simulate { layout = layout }
+          local ok, why = sim:drive(function(arm)
+            arm:move_to(softvt.pose { position = { point.x, 0, 0.3 } })
+          end)
+          return { ok = ok, why = why or '' }
+        end",
+    );
+    let rows = project.run("x.lua").rows();
+    assert_eq!([rows[0]["ok"].as_bool(), rows[1]["ok"].as_bool()], [Some(false), Some(true)]);
+    let reason = project.relative(rows[0]["why"].as_str().expect("a reason"));
+    assert!(
+        reason.starts_with("the expert gave up: ")
+            && reason
+                .contains("x.lua:7: unreachable pose: the tool gets no nearer to (5.000, 0.000, 0.300) m"),
+        "{reason}"
+    );
+}
+
+#[test]
 fn experiments_without_results_are_refused() {
     let run = "run = function(point) return { b = point.a } end";
     assert!(

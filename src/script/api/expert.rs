@@ -22,6 +22,7 @@ use crate::{
     vm::{
         base_library,
         error::{SourceLine, author_line, fail, fail_at, placed},
+        explain,
         library::embedded,
         privilege::check_privilege,
         value::number,
@@ -93,7 +94,8 @@ impl Coroutine {
         *lock(&self.readings) = readings;
     }
 
-    /// Returns the next command, or an error if the arm could not follow the last one.
+    /// Returns the next command. If the arm could not follow the last one, the expert has given up, as
+    /// [`Self::abort`] says.
     pub(crate) fn next_command(
         &mut self,
         lua: &Lua,
@@ -101,7 +103,7 @@ impl Coroutine {
         monitor: &mut TrackingErrorMonitor,
     ) -> mlua::Result<Option<ExpertCommand>> {
         if let Some(complaint) = input.complaint {
-            return Err(self.refuse(lua, &complaint));
+            self.abort(lua, &complaint)?;
         }
         let command = self.step(lua, &input.view)?;
         if command.is_some() {
@@ -162,22 +164,18 @@ impl Coroutine {
 
     /// Ends the expert as `arm:give_up` does, with `complaint` and the line of the script as the reason, unless the
     /// script catches the error.
-    pub(crate) fn abort(&mut self, lua: &Lua, complaint: &str, explain: impl Fn(&mlua::Error) -> String) {
+    fn abort(&mut self, lua: &Lua, complaint: &str) -> mlua::Result<()> {
         if self.gave_up.is_some() {
-            return;
+            return Ok(());
         }
         let error = match self.raise(complaint) {
-            Some(Ok(_)) => return,
+            Some(Ok(_)) => return Ok(()),
             Some(Err(error)) => error,
             None => fail(lua, complaint),
         };
-        self.gave_up = Some(explain(&error).chars().take(MAX_REASON_CHARS).collect());
-    }
-
-    /// Raises `complaint` where the script waits for the next control step, and returns the error.
-    pub(crate) fn refuse(&mut self, lua: &Lua, complaint: &str) -> mlua::Error {
-        // A script that is over, or that catches errors, has no line to show.
-        self.raise(complaint).and_then(Result::err).unwrap_or_else(|| fail(lua, complaint))
+        let reason = explain(lua, &error)?.to_string();
+        self.gave_up = Some(reason.chars().take(MAX_REASON_CHARS).collect());
+        Ok(())
     }
 
     /// Raises `complaint` where the script waits; `None` if it does not wait.

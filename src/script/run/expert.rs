@@ -134,10 +134,6 @@ impl Controller for ExpertController {
         }
         let vm = &self.instance.vm;
         let _deadline = vm.call_deadline();
-        // A pose out of reach fails this episode; in others the objects lie elsewhere.
-        if let Some(complaint) = input.complaint.take() {
-            self.coroutine.abort(&vm.lua, &complaint, |error| vm.explain(error).to_string());
-        }
         let command = self.coroutine.next_command(&vm.lua, input, &mut self.monitor);
         let command = command.map_err(|error| PolicyError::Script(vm.explain(&error).to_string()))?;
         Ok(command.map(|command| {

@@ -258,6 +258,11 @@ impl Vm {
     }
 }
 
+/// Translates an error of the virtual machine for the author of the script, from within one of its functions.
+pub(crate) fn explain(lua: &Lua, error: &mlua::Error) -> mlua::Result<ScriptError> {
+    Ok(app_data::<Arc<VmState>>(lua)?.explain(error))
+}
+
 /// Removes functions that reach the outside or the machine's own state.
 fn remove_unsafe_functions(lua: &Lua) -> mlua::Result<()> {
     for name in ["dofile", "loadfile", "collectgarbage", "warn", "io", "os", "debug", "package", "loadstring"]
@@ -435,7 +440,7 @@ fn iterable(lua: &Lua, (label, value): (String, Value)) -> mlua::Result<Value> {
 /// The text of an error of the host; any other value as it is.
 fn error_text(lua: &Lua, value: Value) -> mlua::Result<Value> {
     let Value::Error(error) = &value else { return Ok(value) };
-    let text = app_data::<Arc<VmState>>(lua)?.explain(error).to_string();
+    let text = explain(lua, error)?.to_string();
     lua.create_string(text).map(Value::String)
 }
 
