@@ -114,6 +114,15 @@ fn a_view_replaces_an_earlier_one_and_keeps_other_files() {
         "--out: page/index.html exists and is not of an earlier view; give another folder"
     );
     assert_eq!(project.text("page/index.html"), "mine");
+    project.write("pictures/episode.png", b"mine");
+    assert_eq!(
+        project.refusal("view x.lua --policy noop --out pictures"),
+        "--out: pictures/episode.png exists and is not of an earlier view; give another folder"
+    );
+    assert_eq!(project.text("pictures/episode.png"), "mine");
+    // One that was interrupted before its page.
+    fs::remove_file(project.path("seen/index.html")).expect("is there");
+    project.succeeds("view x.lua --policy noop --out seen");
     project.write("other/end_of_study.png", b"mine");
     project.succeeds("view x.lua --policy noop --out other");
     assert!(project.path("other/end_of_study.png").is_file());

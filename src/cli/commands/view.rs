@@ -85,11 +85,10 @@ pub(super) fn run(args: ViewArgs) -> Result<(), CliError> {
     };
     let runs: Vec<PreparedRun> = configs.iter().map(prepare).collect::<Result<_, _>>()?;
     RunFolder::check_vacant(&args.out).map_err(|error| CliError::input(format!("--out: {error}")))?;
-    let page = args.out.join(episode_page::PAGE);
-    if page.exists() && !args.out.join(episode_page::FRAME).exists() {
-        let page = page.display();
+    if let Some(found) = foreign_file(&args.out)? {
         return Err(CliError::input(format!(
-            "--out: {page} exists and is not of an earlier view; give another folder"
+            "--out: {} exists and is not of an earlier view; give another folder",
+            found.display()
         )));
     }
     files::create_folder(&args.out)?;
@@ -124,6 +123,27 @@ const MCAP: &str = "episode.mcap";
 /// Moments of the stills, with which the names of their files begin.
 const MOMENTS: [&str; 3] = ["start", "worst", "end"];
 
+/// Files of a view besides its stills.
+const FILES: [&str; 5] = [episode_page::PAGE, episode_page::VIDEO, episode_page::FRAME, ANIMATION, MCAP];
+
+/// The first file in the folder `dir` that a view would replace, where no view has been. One that was interrupted has
+/// left its stills.
+fn foreign_file(dir: &Path) -> Result<Option<PathBuf>, FileError> {
+    let Some(found) = FILES.map(|name| dir.join(name)).into_iter().find(|path| path.exists()) else {
+        return Ok(None);
+    };
+    let names = entries(dir)?;
+    let is_view = dir.join(episode_page::FRAME).is_file() && dir.join(episode_page::PAGE).is_file()
+        || has_stills(&names)
+        || names.iter().any(|path| is_policy_folder(path).unwrap_or(false));
+    Ok((!is_view).then_some(found))
+}
+
+/// True for the contents of a folder with stills of every moment.
+fn has_stills(names: &[PathBuf]) -> bool {
+    MOMENTS.iter().all(|moment| names.iter().any(|path| is_still(path, moment)))
+}
+
 /// Removes the files of an earlier view from a folder and from the folders of its policies.
 fn remove_earlier(dir: &Path) -> Result<(), CliError> {
     if ![episode_page::PAGE, episode_page::FRAME].iter().all(|name| dir.join(name).is_file()) {
@@ -145,8 +165,7 @@ fn is_policy_folder(path: &Path) -> Result<bool, FileError> {
     if path.is_symlink() || !path.is_dir() || path.join(episode_page::FRAME).exists() {
         return Ok(false);
     }
-    let names = entries(path)?;
-    Ok(MOMENTS.iter().all(|moment| names.iter().any(|path| is_still(path, moment))))
+    Ok(has_stills(&entries(path)?))
 }
 
 /// True for a still of a moment.
@@ -163,10 +182,9 @@ fn entries(dir: &Path) -> Result<Vec<PathBuf>, FileError> {
 
 /// Removes the files that a view writes into a folder.
 fn remove_files(dir: &Path) -> Result<(), CliError> {
-    let whole = [episode_page::PAGE, episode_page::VIDEO, episode_page::FRAME, ANIMATION, MCAP];
     for path in entries(dir)? {
         let name = path.file_name().and_then(|name| name.to_str()).unwrap_or_default();
-        if path.is_file() && (whole.contains(&name) || MOMENTS.iter().any(|moment| is_still(&path, moment))) {
+        if path.is_file() && (FILES.contains(&name) || MOMENTS.iter().any(|moment| is_still(&path, moment))) {
             files::remove_if_present(&path)?;
         }
     }
