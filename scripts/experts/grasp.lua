@@ -5,7 +5,7 @@ local hand = require "experts.hand"
 -- CONTACT_CLEARANCE: distance of each gel from the object at which closing becomes slow, m.
 local grasp = { SPREAD = 0.0015, CONTACT_CLEARANCE = 0.002 }
 
-local STROKE, CASE = hand.STROKE, hand.CASE
+local STROKE, CASE, FORCE = hand.STROKE, hand.CASE, hand.FORCE
 -- Clearance to leave below the cases and around the fingers, m.
 local UNDER, FINGER_CLEARANCE = 0.0015, 0.004
 -- Step of the rotations tried for clearance.
@@ -116,6 +116,16 @@ function grasp.target(object, share)
   return { width = between "width", force = between "force" }
 end
 
+-- Why the hand cannot close to a grip; nil if it can. The window of a slippery object may ask for such grips.
+function grasp.grip_problem(grip)
+  if grip.force > 0 and (grip.width < 0 or grip.width > STROKE or grip.force > FORCE) then
+    return ("needs a grip %.1f mm wide with %.1f N on each pad, which the hand does not have"):format(
+      1e3 * grip.width,
+      grip.force
+    )
+  end
+end
+
 -- Width of the command that holds a grip, m: each finger is a spring, which the force on its pad displaces from its
 -- target. Without a stiffness of the drives (N/m), that of the standard hand.
 function grasp.command_width(grip, stiffness) return grip.width - 2 * grip.force / (stiffness or hand.STIFFNESS) end
@@ -131,7 +141,8 @@ function grasp.closure(object) return grasp.command(grasp.target(object, 0.5)) e
 -- The closure at which each gel is `clearance` (m, default 4 mm) away from the object, for approach and release.
 -- `width` (m, default that of a nominal grasp) is the distance of the gels at first contact.
 function grasp.clear_closure(object, clearance, width)
-  return math.max(0, 1 - ((width or grasp.width(object)) + 2 * (clearance or 0.004)) / STROKE)
+  local closure = 1 - ((width or grasp.width(object)) + 2 * (clearance or 0.004)) / STROKE
+  return math.max(0, math.min(1, closure))
 end
 
 -- Rotations of the hand to try, rad: around the shorter side, or all around a square or round object.
@@ -207,7 +218,8 @@ function grasp.close(arm, object, grip, options)
   grasp.approach(arm, object, options.width)
   if options.closure then return arm:grasp(options.closure, { rate = rate }) end
   local most = grasp.command(grip, arm.finger_stiffness)
-  if grip.force == 0 then return arm:grasp(most, { rate = rate }) end
+  -- A hand that feels finds its own grip.
+  if grip.force == 0 or arm.feels then return arm:grasp(most, { rate = rate }) end
   -- The command is bounded, in case the object yields or a pad misses it.
   most = math.min(1, most + COMMAND_MARGIN / STROKE)
   if options.stop == "touch" then return arm:grasp(most, { rate = rate, force = grip.force }) end

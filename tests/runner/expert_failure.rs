@@ -74,6 +74,51 @@ fn an_object_too_wide_for_the_hand_is_given_up_before_the_approach() {
     assert!(record.verdict.d_peak.is_some_and(|d| d < 0.1), "the hand never touched it: {record:#?}");
 }
 
+/// A suite in which the expert places a soft cube that the layout has changed.
+fn slippery(change: &str) -> Project {
+    let suite = format!(
+        "local pick_place, arrange = require 'experts.pick_place', require 'layouts.arrange'
+        local table_top, plate, cube = require 'assets.table', require 'assets.plate', require 'assets.cube'
+        local layout = softvt.layout('l', function(scene, rng)
+          scene:add {{ name = 'table', asset = table_top, position = {{ 0, 0, 0 }} }}
+          arrange.add(scene, rng, {{ {{ name = 'plate', asset = plate, at = {{ 0.04, 0.12 }} }},
+            {{ name = 'left', asset = cube, at = {{ -0.08, -0.08 }} }} }}, 0.02)
+          {change}
+        end)
+        return softvt.suite {{ name = 'slippery', object_type = 'deformable', tasks_differ_in = 'spatial', episodes = 1, tasks = {{
+          softvt.task {{ prompt = 'p', layout = layout, goal = softvt.on {{ object = 'left', target = 'plate' }},
+            expert = pick_place {{ object = 'left', target = 'plate' }}, budget_steps = 12 }} }} }}"
+    );
+    Project::new(&[("x.lua", &suite)])
+}
+
+#[test]
+fn a_grip_that_the_hand_does_not_have_ends_the_episode_alone() {
+    let record = slippery("scene:object('left').coating = 0.001").run("x.lua").record();
+    let reason = record.stats.gave_up.expect("a reason");
+    assert!(
+        reason.starts_with("left needs a grip -")
+            && reason.ends_with(" on each pad, which the hand does not have"),
+        "{reason}"
+    );
+    let held = slippery("").run("x.lua").record();
+    assert_eq!((held.stats.gave_up, held.outcome), (None, Outcome::Budget));
+}
+
+#[test]
+fn hints_beyond_the_object_end_no_run() {
+    for hint in ["grasp_height_m = 0.2", "grasp_offset_m = 0.5", "grasp_width_m = -0.2"] {
+        let text = Small::default().text();
+        let expert = "expert = require('experts.pick_place') { object = 'cube', target = 'post' } }";
+        let text = text.replace("expert = function(arm, scene) arm:wait(1) end }", expert);
+        let with_hint =
+            text.replacen("name = \"cube\",", &format!("name = \"cube\", hints = {{ {hint} }},"), 1);
+        assert_ne!(with_hint, text, "{text}");
+        let record = Project::new(&[("x.lua", &with_hint)]).run("x.lua").record();
+        assert!(!matches!(record.outcome, Outcome::Error { .. }), "{hint}: {:?}", record.outcome);
+    }
+}
+
 #[test]
 fn notes_of_an_expert_are_in_its_record() {
     let project = Small { expert: "arm:note('grip_width_mm', 31.5)", ..Small::default() }.project();
