@@ -17,6 +17,7 @@ mod error;
 mod evaluate;
 pub mod experiment;
 mod experiment_folder;
+mod friction;
 mod golden;
 pub mod growth;
 pub mod import;

@@ -1,12 +1,18 @@
 //! A suite with everything that its episodes need: settings, deformation limits, assets and controllers.
 
-use std::{collections::BTreeMap, ops::Deref, path::PathBuf, sync::Arc};
+use std::{
+    collections::{BTreeMap, BTreeSet},
+    ops::Deref,
+    path::PathBuf,
+    sync::Arc,
+};
 
 use crate::{
     config::{RunConfig, TraceDetail},
     episode_artifacts::EpisodeArtifacts,
     episode_list::{EpisodeJob, EpisodeList},
     error::{RunError, RunErrorCause},
+    friction::{HiddenFriction, friction_warnings},
     limits::{CalibrationFiles, Calibrations, LimitScan, SceneLimits},
     policy::{ControllerFactory, DeclaredStreams},
     recorded_runs::{RecordedRuns, ReplaySource},
@@ -470,11 +476,13 @@ impl<'a> SuiteRun<'a> {
     /// Checks the first episode of each task. Returns true if the policy observes the true forces on the pads.
     fn check_first_episodes(&self) -> Result<bool, RunError> {
         let mut has_changed = false;
+        let mut warnings = BTreeSet::new();
         let mut force_observed = self.observes_recorded_force();
         for task in self.jobs.tasks() {
             let first = self.jobs.episodes_of(task.id).next().unwrap_or(0);
             let opened = self.open_episode(&self.episode_id(task, first))?;
             has_changed |= opened.is_shifted();
+            warnings.extend(friction_warnings(self, task, &opened, HiddenFriction::Whole));
             self.check_object_type(task, &opened.nominal)?;
             let scene = Arc::new(opened.scene.clone());
             self.check_declared_cameras(&scene, task)?;
@@ -491,6 +499,10 @@ impl<'a> SuiteRun<'a> {
         }
         if !has_changed {
             self.refuse_shifts_without_effect()?;
+        }
+        // Those about other objects of the same change would say no more.
+        if let Some(warning) = warnings.first() {
+            self.config.notice(format!("warning: {warning}"));
         }
         Ok(force_observed)
     }

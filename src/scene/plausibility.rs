@@ -18,23 +18,28 @@ const MAX_DENSITY: f64 = 23_000.0;
 const MAX_SAG: f64 = 0.15;
 
 impl Asset {
-    /// Warnings about its materials and visuals, one sentence each.
+    /// Warnings about its material and visuals, one sentence each.
     pub fn warnings(&self) -> Vec<String> {
         let mut warnings = self.material_warnings();
-        warnings.extend(self.friction_warning());
         warnings.extend(self.visual_warnings());
         warnings
     }
 
-    /// A warning about a slippery surface that is not: the other one of a pair has the larger coefficients.
-    fn friction_warning(&self) -> Option<String> {
-        let (own, others) = (self.friction.static_mu, Friction::STANDARD.static_mu);
+    /// A warning about a slippery surface that is not.
+    pub fn friction_warning(&self) -> Option<String> {
+        let own = self.friction.static_mu;
+        let hidden = self.hidden_friction(own, &Friction::STANDARD, "tables and pads")?;
+        let own = format_number(own);
+        Some(format!("friction.static_mu is {own}, and {hidden}; for a slippery surface add coated = true"))
+    }
+
+    /// Why a static coefficient has no effect on a free object: `others` have a larger one.
+    pub fn hidden_friction(&self, static_mu: f64, other: &Friction, others: &str) -> Option<String> {
         let is_free = matches!(self.body, Body::Soft(_) | Body::Rigid { .. });
-        (is_free && !self.friction.coated && own < others).then(|| {
-            let own = format_number(own);
+        (is_free && !self.friction.coated && static_mu < other.static_mu).then(|| {
             format!(
-                "friction.static_mu is {own}, and a pair of surfaces takes the larger coefficient, which is at least {others} on \
-                 tables and pads; for a slippery surface add coated = true"
+                "a pair of surfaces takes the larger coefficient, which is at least {} on {others}",
+                format_number(other.static_mu)
             )
         })
     }
@@ -131,12 +136,16 @@ mod tests {
                 visuals: Vec::new(),
                 hints: Default::default(),
             };
-            asset.warnings()
+            asset.friction_warning()
         };
         let slippery = Friction::new(0.05, 0.04);
-        assert!(of(slippery)[0].starts_with("friction.static_mu is 0.05, and a pair of surfaces"));
-        assert_eq!(of(Friction { coated: true, ..slippery }), [""; 0]);
-        assert_eq!(of(Friction::default()), [""; 0]);
+        let doubted = of(slippery);
+        assert!(
+            doubted
+                .is_some_and(|text| text.starts_with("friction.static_mu is 0.05, and a pair of surfaces"))
+        );
+        assert_eq!(of(Friction { coated: true, ..slippery }), None);
+        assert_eq!(of(Friction::default()), None);
     }
 
     fn warnings(youngs_pa: f64, density: f64) -> Vec<String> {

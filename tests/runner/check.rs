@@ -430,6 +430,51 @@ fn a_variation_that_changes_nothing_is_doubted() {
     assert!(warns("{ 1, 1 }") && !warns("{ 1, 1.1 }"));
 }
 
+/// A variation of friction alone.
+fn friction_variation(range: &str) -> String {
+    let one = "{ 1, 1 }";
+    format!(
+        "return softvt.variation {{ name = 'v', size = {one}, stiffness = {one}, density = {one}, friction = {range}, \
+         colour = 0, light = {one}, camera_offset = 0, camera_rotation = 0 }}"
+    )
+}
+
+#[test]
+fn friction_that_loosens_no_grip_is_told_with_what_set_it() {
+    let shifted = Small::default().text().replace("tasks = {", "shifts = require('shifts').soft, tasks = {");
+    let project = Project::new(&[("x.lua", &shifted)]);
+    let reason = "a pair of surfaces takes the larger coefficient, which is at least";
+    let run =
+        |change: &str, value: f64| project.run("x.lua").policy("noop").shift(change, value).finish().messages;
+    let told = format!(
+        "warning: shift friction=0.02: grips of cube are no looser with its static_mu of 0.012, since {reason} 1.5 on the pads; "
+    );
+    assert!(run("friction", 0.02).contains(&told), "{}", run("friction", 0.02));
+    assert!(!run("friction", 3.0).contains(reason) && !run("mass", 2.0).contains(reason));
+    let varied = |range: &str| {
+        project.write("v.lua", friction_variation(range).as_bytes());
+        project.run("x.lua").with(|config| config.vary = Some(project.path("v.lua")))
+    };
+    let of_asset = |range: &str| {
+        format!(
+            "variation v: its factors on friction give objects a static_mu in {range}, and {reason} 0.6 on tables"
+        )
+    };
+    let messages = |range: &str| varied(range).policy("noop").finish().messages;
+    assert!(messages("{ 0.1, 0.11 }").contains(&of_asset("0.06..0.066")), "{}", messages("{ 0.1, 0.11 }"));
+    assert!(!messages("{ 0.7, 1.4 }").contains(reason), "a part of them changes how objects slide on tables");
+    let checked = varied("{ 0.7, 1.4 }").check().expect("valid").join("\n");
+    assert!(
+        checked.contains(&of_asset("0.42..0.84")) && !checked.contains("asset cube: friction"),
+        "{checked}"
+    );
+    let of_layout = |at| warnings(&Small { at, ..Small::default() }.project());
+    let by_layout = of_layout("at = { 0, 0.1 } } scene:object('cube').static_mu = 0.5 local _ = {");
+    assert!(by_layout.contains("object cube: its static_mu is 0.5, and a pair"), "{by_layout}");
+    let coated = of_layout("at = { 0, 0.1 } } scene:object('cube').coating = 0.05 local _ = {");
+    assert!(!coated.contains(reason), "{coated}");
+}
+
 #[test]
 fn objects_of_a_kitchen_are_placed_in_mm() {
     let of = |entries: &str| {
