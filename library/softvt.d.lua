@@ -1856,6 +1856,11 @@ function softvt.world(spec) end
 ---@return string
 function softvt.fingerprint(asset) end
 
+---Returns what is most likely a mistake in the material and the visuals of an asset, as softvt check tells it.
+---@param asset softvt.Asset
+---@return string[]
+function softvt.asset_warnings(asset) end
+
 ---Builds a scene with the robot and lets it settle. Deformation refers to the settled shapes.
 ---@param spec softvt.SimulateSpec
 ---@return softvt.Simulation

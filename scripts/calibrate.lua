@@ -132,9 +132,24 @@ local function press_variant(name, factors, o)
   return rows
 end
 
+-- Tells at the start of a press, which takes minutes, what its result will lack.
+local function tell_doubts(asset)
+  for _, warning in ipairs(softvt.asset_warnings(asset)) do
+    print(("warning: asset %s: %s"):format(asset.name, warning))
+  end
+  if not (asset.body.collapse_strain or asset.body.damage_strain) then
+    print(
+      ("warning: asset %s: its softvt.soft has neither collapse_strain nor damage_strain, so that D_ref says where the press ends, not what the material bears"):format(
+        asset.name
+      )
+    )
+  end
+end
+
 -- Rows of a press test: the sweep, then holds between its contact and τ.
 local function press_asset(name, o)
   local asset, rows = assets[name], {}
+  tell_doubts(asset)
   local sweep = press.sweep(asset, 1e-3 * o.step_mm)
   append(rows, "sweep", name, sweep.rows)
   append(rows, "end", name, { { ended = sweep.ended, stable_strain = sweep.stable_strain } })
@@ -201,6 +216,23 @@ local function warnings(name, found)
   return text
 end
 
+-- Limits below this are shown as 0, %.
+local LEAST_TAU = 0.0005
+
+-- Why the limit of an asset is no result; nil if it is one.
+local function no_limit(name, found)
+  if not found.tau or found.tau >= LEAST_TAU then return nil end
+  local cause = "it is too stiff to be deformed; check youngs_pa, in Pa, or use softvt.rigid"
+  for _, warning in ipairs(softvt.asset_warnings(assets[name])) do
+    if warning:find "^youngs_pa" then cause = warning end
+  end
+  return ("%s: τ is %.2g %%, below what the simulation resolves: %s; no file of it is written"):format(
+    name,
+    found.tau,
+    cause
+  )
+end
+
 -- Why an asset has no window, from the first line of its envelope.
 local function problem_of(found)
   local line = found.text:match "[^\n]*"
@@ -209,25 +241,34 @@ local function problem_of(found)
 end
 
 local function finish(rows, o)
-  local files, text, found, problems = {}, {}, {}, {}
+  local files, text, found, problems, unusable = {}, {}, {}, {}, {}
   for _, name in ipairs(o.asset) do
     local one = envelope(name, rows, o)
-    local at = "assets/calibration/" .. name
-    files[at .. ".json"], files[at .. ".sweep.jsonl"], files[at .. ".svg"], files[at .. ".txt"] =
-      one.json, one.sweep, one.plot, one.text
-    found[name] = one
     text[#text + 1] = one.text .. three_kappas(one) .. warnings(name, one)
-    if not one.window.extent_mm then problems[#problems + 1] = problem_of(one) end
+    local unresolved = no_limit(name, one)
+    if unresolved then
+      unusable[#unusable + 1] = "calibrate: " .. unresolved
+    else
+      local at = "assets/calibration/" .. name
+      files[at .. ".json"], files[at .. ".sweep.jsonl"], files[at .. ".svg"], files[at .. ".txt"] =
+        one.json, one.sweep, one.plot, one.text
+      found[name] = one
+      if not one.window.extent_mm then problems[#problems + 1] = problem_of(one) end
+    end
   end
   if asset_names.has_all_soft(found) then
     files["docs/calibration.md"] = calibration_page(asset_names.soft, found, o)
   end
-  local problem
   if #problems > 0 then
-    problem = ("calibrate: %s\nThe files are written, without windows of these assets for experts."):format(
-      table.concat(problems, "\n")
+    table.insert(
+      unusable,
+      1,
+      ("calibrate: %s\nThe files are written, without windows of these assets for experts."):format(
+        table.concat(problems, "\n")
+      )
     )
   end
+  local problem = #unusable > 0 and table.concat(unusable, "\n") or nil
   return { text = table.concat(text, "\n"), files = files, problem = problem }
 end
 

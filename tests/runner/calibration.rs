@@ -68,6 +68,20 @@ fn a_material_without_strains_is_calibrated_with_a_warning() {
 }
 
 #[test]
+fn a_limit_that_rounds_to_nothing_is_no_result() {
+    let project = brick("");
+    let stiff = project.text("assets/brick.lua").replace("4e4", "4e10");
+    project.write("assets/brick.lua", stiff.as_bytes());
+    let run = quick(&project, "run");
+    let message = run.experiment().1.expect_err("no limit");
+    assert!(
+        message.contains("brick: τ is ") && message.contains("stiffer than rubber; give it in Pa"),
+        "{message}"
+    );
+    assert!(!project.path("run/assets/calibration/brick.json").exists());
+}
+
+#[test]
 fn a_strain_out_of_range_is_refused() {
     for (strain, got) in
         [("collapse_strain = 0", "0"), ("damage_strain = 1.5", "1.5"), ("damage_strain = -0.1", "-0.1")]

@@ -166,5 +166,7 @@ functions! {
     FUNCTIONS {
         /// Returns the fingerprint of an asset: a hash of its shape, material and friction. Calibrations refer to it.
         fn fingerprint(lua, asset: Constructed<AssetSpec>) -> ["string"] { asset.asset(lua)?.fingerprint() }
+        /// Returns what is most likely a mistake in the material and the visuals of an asset, as softvt check tells it.
+        fn asset_warnings(lua, asset: Constructed<AssetSpec>) -> ["string[]"] { asset.asset(lua)?.warnings() }
     }
 }
