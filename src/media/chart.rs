@@ -3,6 +3,7 @@
 
 use super::{
     labels::spread,
+    palette,
     svg::{self, Anchor, Place, at, circle, diamond, line, polyline, text, upward_text},
     ticks::{Decades, linear_ticks, tick_label, tick_step},
 };
@@ -28,10 +29,16 @@ const NAME_LETTERS: usize = 19;
 const TITLE_LETTERS: usize = 80;
 /// Largest and smallest extent of an axis whose ticks are written as decimals.
 const DECIMALS: std::ops::Range<f64> = 1e-4..1e6;
-/// Strokes of the second and third series, beside the classes of [`svg::image`].
-const STYLE: &str = "<style>.second{stroke:var(--ink);stroke-dasharray:7 3}.third{stroke:var(--soft);stroke-dasharray:2 3}</style>\n";
 /// Share of the extent of the points that a linear axis adds at both ends.
 const PADDING: f64 = 0.04;
+
+/// Strokes of the second and third series, beside the classes of [`svg::image`].
+fn style() -> String {
+    let colours = svg::on_both_grounds(|of| {
+        format!(".second{{stroke:{}}}.third{{stroke:{}}}", of(&palette::INK), of(&palette::FAINT))
+    });
+    format!("<style>{colours}.second{{stroke-dasharray:7 3}}.third{{stroke-dasharray:2 3}}</style>\n")
+}
 
 /// Contents of a chart.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -92,14 +99,8 @@ impl Chart {
         let title = text(at(12.0, 20.0), Anchor::Start, "title", &shortened(&self.title, TITLE_LETTERS));
         let drawn: String =
             self.series.iter().enumerate().map(|(i, series)| draw(i, series, &scales)).collect();
-        let parts = [
-            STYLE.to_owned(),
-            self.axes(&scales),
-            self.level_lines(&scales),
-            drawn,
-            self.names(&scales),
-            title,
-        ];
+        let parts =
+            [style(), self.axes(&scales), self.level_lines(&scales), drawn, self.names(&scales), title];
         svg::image(WIDTH, HEIGHT, FONT_SIZE, &self.title, &parts.concat())
     }
 

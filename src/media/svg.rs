@@ -55,30 +55,32 @@ pub fn image(width: f64, height: f64, font_size: f64, label: &str, contents: &st
     )
 }
 
-/// The style sheet of an image.
+/// The style sheet of an image. It has no variables, which many programs other than browsers do not read.
 fn style() -> String {
-    let colours = [
-        ("ink", palette::INK),
-        ("rule", palette::RULE),
-        ("ground", palette::GROUND),
-        ("soft", palette::FAINT),
-        ("safe", palette::SAFE),
-        ("over", palette::OVER_LIMIT),
-    ];
-    let all = |of: fn(&Colour) -> &'static str| {
-        let pairs = colours.iter().map(|(name, colour)| format!("--{name}:{}", of(colour)));
-        pairs.collect::<Vec<_>>().join(";")
-    };
     format!(
-        "svg{{{}}}@media(prefers-color-scheme:dark){{svg{{{}}}}}\
-         text{{fill:var(--ink)}}.soft{{fill:var(--soft)}}.title{{font-weight:600}}.ground{{fill:var(--ground)}}\
-         .axis{{stroke:var(--ink)}}.grid{{stroke:var(--rule)}}.curve{{fill:none;stroke:var(--safe);stroke-width:1.6}}\
-         .dot,.bar{{fill:var(--safe)}}.dot,.ring{{stroke:var(--safe)}}.ring,.mark-ring{{fill:var(--ground)}}\
-         .mark{{fill:var(--ink)}}.mark,.mark-ring{{stroke:var(--ink)}}.limit{{stroke:var(--over);stroke-dasharray:5 4}}\
-         .over{{stroke:var(--over);stroke-width:2;stroke-opacity:.5}}text.over{{fill:var(--over);stroke:none;font-weight:600}}\
-         .end{{stroke:var(--safe)}}.band{{fill:var(--safe);fill-opacity:.15}}.pressed{{fill:url(#hatch)}}",
-        all(|colour| colour.light),
-        all(|colour| colour.dark)
+        "{}.title{{font-weight:600}}.curve{{fill:none;stroke-width:1.6}}.limit{{stroke-dasharray:5 4}}\
+         .over{{stroke-width:2;stroke-opacity:.5}}text.over{{stroke:none;font-weight:600}}.band{{fill-opacity:.15}}\
+         .pressed{{fill:url(#hatch)}}",
+        on_both_grounds(colour_rules)
+    )
+}
+
+/// Rules of a style sheet for light ground, and those for dark ground where the reader prefers it.
+pub(super) fn on_both_grounds(rules: impl Fn(fn(&Colour) -> &'static str) -> String) -> String {
+    let (light, dark) = (rules(|colour| colour.light), rules(|colour| colour.dark));
+    format!("{light}@media(prefers-color-scheme:dark){{{dark}}}")
+}
+
+/// The rules about colours.
+fn colour_rules(of: fn(&Colour) -> &'static str) -> String {
+    let colours =
+        [palette::INK, palette::RULE, palette::GROUND, palette::FAINT, palette::SAFE, palette::OVER_LIMIT];
+    let [ink, rule, ground, soft, safe, over] = colours.each_ref().map(of);
+    format!(
+        "text{{fill:{ink}}}.soft{{fill:{soft}}}.ground{{fill:{ground}}}.axis{{stroke:{ink}}}.grid{{stroke:{rule}}}\
+         .curve{{stroke:{safe}}}.dot,.bar{{fill:{safe}}}.dot,.ring{{stroke:{safe}}}.ring,.mark-ring{{fill:{ground}}}\
+         .mark{{fill:{ink}}}.mark,.mark-ring{{stroke:{ink}}}.limit{{stroke:{over}}}.over{{stroke:{over}}}\
+         text.over{{fill:{over}}}.end{{stroke:{safe}}}.band{{fill:{safe}}}"
     )
 }
 
@@ -157,4 +159,17 @@ pub fn rect(area: Area, class: &str) -> String {
 
 fn class_of(class: &str) -> String {
     if class.is_empty() { String::new() } else { format!(" class=\"{class}\"") }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn colours_are_plain_ones_for_programs_without_variables() {
+        let image = image(10.0, 10.0, 12.0, "a", "");
+        let (light, dark) = image.split_once("@media(prefers-color-scheme:dark)").expect("two grounds");
+        assert!(!image.contains("var(") && light.contains("text{fill:#1c2024}"), "{image}");
+        assert!(dark.contains("text{fill:#e6e8eb}"), "{image}");
+    }
 }
