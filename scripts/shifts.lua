@@ -146,7 +146,13 @@ local shifts = {
     apply = function(scene, value)
       if value < 1 then return end
       local what, where, target = scene.prompt:match "^pick up the (.-) and place it (%a+) the (.+)$"
-      if not what then error(("shift prompt: there is no paraphrase of %q"):format(scene.prompt)) end
+      if not what then
+        error(
+          ('shift prompt: there is no paraphrase of %q; it has those of "pick up the … and place it in the …"'):format(
+            scene.prompt
+          )
+        )
+      end
       scene.prompt = PARAPHRASES[math.floor(value)]:format(what, where, target)
     end,
   },

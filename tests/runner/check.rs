@@ -476,6 +476,19 @@ fn friction_that_loosens_no_grip_is_told_with_what_set_it() {
 }
 
 #[test]
+fn a_prompt_without_paraphrases_is_told_with_those_that_have_them() {
+    let text = Small::default().text().replace("tasks = {", "shifts = require('shifts').soft, tasks = {");
+    let message = Project::new(&[("x.lua", &text)])
+        .run("x.lua")
+        .shift("prompt", 1.0)
+        .check()
+        .expect_err("no paraphrase");
+    let expected =
+        "there is no paraphrase of \"wait\"; it has those of \"pick up the … and place it in the …\"";
+    assert!(message.contains(expected), "{message}");
+}
+
+#[test]
 fn objects_of_a_kitchen_are_placed_in_mm() {
     let of = |entries: &str| {
         let text = format!(

@@ -70,6 +70,10 @@ fn experiments_without_results_are_refused() {
     );
     let points = format!("points = function() return {{ a = 1 }} end, {run}");
     assert!(problem(&points).contains("experiment.points: expected a list of at least one table"));
+    let outside = "grid = { a = { 1 } }, run = function() return { a = 1 } end, finish = function() return { files = { ['/x.svg'] = 'x' } } end";
+    assert!(
+        problem(outside).contains("finish.files: \"/x.svg\" is no path within the folder; give one such as")
+    );
     let misspelt = "grid = { a = { 1 } }, run = function(point) return { b = point.aa } end";
     assert_snapshot!(problem(misspelt), @r#"x.lua:2: point: unknown key "aa"; did you mean "a"? (point 0 {"a":1})"#);
     let listed = "points = function() return { { young = 1 }, { change = 2 } } end, run = function(p) return { b = p.change or p.youngs } end";

@@ -162,8 +162,10 @@ fn read_summary(lua: &Lua, value: &Value) -> mlua::Result<ExperimentSummary> {
             return Err(fail(lua, format!("finish.files: {path:?} holds a control character; leave it out")));
         }
         if !path.split('/').all(is_inside) {
-            let message =
-                format!("finish.files: {path:?} leads out of the folder; give a path without \"..\"");
+            let message = format!(
+                "finish.files: {path:?} is no path within the folder; give one such as \"plots/d.svg\", without \"..\", \
+                 \":\" and \"\\\", and no \"/\" at its beginning"
+            );
             return Err(fail(lua, message));
         }
         let content = file_content(lua, &content)?;
