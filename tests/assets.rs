@@ -296,8 +296,11 @@ fn stacks(stacks: &[&[&str]]) -> Vec<Scene> {
 #[test]
 fn the_standard_hand_of_the_experts_is_that_of_the_robot() {
     let hand = include_str!("../scripts/experts/hand.lua");
-    let (stroke, stiffness) = (gripper::MAX_WIDTH, RobotSpec::default().gripper.kp);
-    for number in [format!("STROKE = {stroke},"), format!("STIFFNESS = {stiffness} }}")] {
+    let (stroke, force, stiffness) =
+        (gripper::MAX_WIDTH, gripper::MAX_FORCE, RobotSpec::default().gripper.kp);
+    for number in
+        [format!("STROKE = {stroke},"), format!("FORCE = {force},"), format!("STIFFNESS = {stiffness} }}")]
+    {
         assert!(hand.contains(&number), "{number} in {hand}");
     }
 }

@@ -25,7 +25,7 @@ const MOMENTS: [(&str, &str); 3] =
     [("worst", "At the worst moment"), ("start", "At the start"), ("end", "At the end")];
 /// Stills of a moment, by the names of files and in words.
 const STILLS: [(&str, &str); 7] = [
-    (CLOSE_UP_STILL, "object from nearby; red: material at its strain limit"),
+    (CLOSE_UP_STILL, "object from nearby; red: beyond the stable strain"),
     ("third_person", "third person"),
     ("wrist", "wrist"),
     ("tactile_left_arrows", "left finger, motion of the markers"),

@@ -136,7 +136,7 @@ impl VideoCaption {
 
     /// Name of the panel that shows the target from nearby.
     fn close_up_name(&self) -> &'static str {
-        if self.is_soft { "object, red: strain limit" } else { "object" }
+        if self.is_soft { "object, red: beyond stable strain" } else { "object" }
     }
 
     /// The state that shows the result best: the drop, the end of a goal that was missed, or the worst one.

@@ -30,7 +30,10 @@ use crate::{
 };
 use softvt_common::{parallel::lock, text::unknown_name};
 use softvt_geometry::Pose;
-use softvt_robot::{Obstacle, clearance, gripper::MAX_WIDTH};
+use softvt_robot::{
+    Obstacle, clearance,
+    gripper::{MAX_FORCE, MAX_WIDTH},
+};
 use softvt_scene::{Asset, Body};
 
 /// Access of an expert to the tactile sensors.
@@ -269,12 +272,10 @@ const RATE: Type = Type::Number("1/s", Range::closed(1e-3, 5.0));
 /// wrong.
 const MAX_SPEED: f64 = 6.8;
 const MAX_ANGULAR_SPEED: f64 = 10.0;
-/// Largest force of the hand, N (Franka Hand, product manual: maximum grasping force).
-const MAX_GRIP_FORCE: f64 = 140.0;
 
 #[expect(dead_code, reason = "the arm's Lua code reads the fields")]
 mod options {
-    use super::{CLOSURE, MAX_ANGULAR_SPEED, MAX_GRIP_FORCE, MAX_SPEED, MAX_WIDTH, RATE};
+    use super::{CLOSURE, MAX_ANGULAR_SPEED, MAX_FORCE, MAX_SPEED, MAX_WIDTH, RATE};
     use crate::schema::{Range, Type, record};
 
     record! {
@@ -299,7 +300,7 @@ mod options {
             /// Measured distance of the gels at which closing stops. A tactile servo ignores it.
             width: Option<f64> = Type::Number("m", Range::closed(0.0, MAX_WIDTH));
             /// Mean normal force per pad at which closing stops. A tactile servo ignores it.
-            force: Option<f64> = Type::Number("N", Range::above(0.0, MAX_GRIP_FORCE));
+            force: Option<f64> = Type::Number("N", Range::above(0.0, MAX_FORCE));
         }
         /// Options of releasing an object.
         ReleaseOptions: "softvt.ReleaseOptions" as "arm:release" {
