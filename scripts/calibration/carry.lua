@@ -33,7 +33,7 @@ end
 local function carried(asset, one, force, k)
   local displacement = {}
   local sim = softvt.simulate { layout = single_object(asset, one, displacement), episode = k }
-  local ok = sim:drive(function(arm, scene)
+  local ok = trial.drive(sim, function(arm, scene)
     local object = scene:object "object"
     local at = grasp.pose(object, grasp.height(object), displacement)
     arm:move_to(at:translated { 0, 0, 0.08 }, { speed = 0.6, angular_speed = 3 })
@@ -44,7 +44,7 @@ local function carried(asset, one, force, k)
   end)
   local before, height = sim:measure "object", sim:tool()[3]
   ok = ok
-    and sim:drive(function(arm, scene)
+    and trial.drive(sim, function(arm, scene)
       local pace = grasp.carry_pace(scene:object "object")
       arm:move_by({ 0, 0, LIFT }, { speed = SPEED * pace })
       arm:move_by({ 0, ALONG, 0 }, { speed = FAST * pace })

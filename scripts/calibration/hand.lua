@@ -64,9 +64,9 @@ local function heights(sim) return { tool = (sim:tool())[3], height = sim:measur
 local function hold_trial(asset, closure, k, how, hold_s)
   local displacement = {}
   local sim = softvt.simulate { layout = single_object(asset, displacement, how.offset, how.turn), episode = k }
-  local ok, pace = sim:drive(grasp_at(closure, displacement)), grasp.carry_pace(asset)
+  local ok, pace = trial.drive(sim, grasp_at(closure, displacement)), grasp.carry_pace(asset)
   local width_mm, before = 1e3 * sim:measure "object".width_m, heights(sim)
-  ok = ok and sim:drive(function(arm) arm:move_by({ 0, 0, how.lift }, { speed = how.speed * pace }) end)
+  ok = ok and trial.drive(sim, function(arm) arm:move_by({ 0, 0, how.lift }, { speed = how.speed * pace }) end)
   -- An object that was not lifted by now is not held.
   if ok and lag_mm(sim, before) < 0.5e3 * how.lift then ok = sim:wait(hold_s) end
   local slip = math.abs(lag_mm(sim, before))
@@ -111,7 +111,7 @@ end
 -- contact of a row are those of the last REST_S seconds.
 local function squeeze(sim, closure)
   local row = { closure = closure, stable = false }
-  local ok = sim:drive(function(arm) arm:close_to(closure, { rate = 0.2 }) end)
+  local ok = trial.drive(sim, function(arm) arm:close_to(closure, { rate = 0.2 }) end)
   local elapsed_s, resting_s = 0, 0
   while ok and resting_s < REST_S and elapsed_s < REST_TIMEOUT_S do
     ok = sim:wait(0.05)
@@ -140,8 +140,7 @@ end
 -- followed.
 local function squeeze_from(asset, first, step, rows)
   local sim = softvt.simulate { layout = single_object(asset) }
-  local ok, why = sim:drive(grasp_at(first))
-  if not ok then error(asset.name .. ": " .. why, 0) end
+  trial.drive(sim, grasp_at(first))
   local closure, last = first, nil
   while closure <= 1 + 1e-9 do
     local row = squeeze(sim, math.min(closure, 1))

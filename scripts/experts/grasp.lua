@@ -116,13 +116,12 @@ function grasp.target(object, share)
   return { width = between "width", force = between "force" }
 end
 
--- Why the hand cannot close to a grip; nil if it can. The window of a slippery object may ask for such grips.
-function grasp.grip_problem(grip)
-  if grip.force > 0 and (grip.width < 0 or grip.width > STROKE or grip.force > FORCE) then
-    return ("needs a grip %.1f mm wide with %.1f N on each pad, which the hand does not have"):format(
-      1e3 * grip.width,
-      grip.force
-    )
+-- What the hand lacks for a grip; nil if nothing. The window of a slippery object may ask for such grips. A grip that
+-- ends when the pads press has no width.
+local function beyond_hand(grip, stop)
+  if grip.force > FORCE then return ("a force of %.0f N on each pad"):format(grip.force) end
+  if stop ~= "touch" and (grip.width < 0 or grip.width > STROKE) then
+    return ("a width of %.1f mm"):format(1e3 * grip.width)
   end
 end
 
@@ -220,6 +219,8 @@ function grasp.close(arm, object, grip, options)
   local most = grasp.command(grip, arm.finger_stiffness)
   -- A hand that feels finds its own grip.
   if grip.force == 0 or arm.feels then return arm:grasp(most, { rate = rate }) end
+  local lack = beyond_hand(grip, options.stop)
+  if lack then arm:give_up(("%s needs %s, which the hand does not have"):format(object.name, lack)) end
   -- The command is bounded, in case the object yields or a pad misses it.
   most = math.min(1, most + COMMAND_MARGIN / STROKE)
   if options.stop == "touch" then return arm:grasp(most, { rate = rate, force = grip.force }) end

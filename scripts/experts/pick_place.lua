@@ -250,11 +250,7 @@ local function make(_, spec, surplus)
     if problem then arm:give_up(spec.object .. " " .. problem) end
     local controller = arm.grip_controller
     local close = controller and blind_grips.controller(controller, arm.instances, scene:object(spec.object))
-    if not (spec.closure or close) and grasp.window(scene:object(spec.object)) then
-      local no_grip = not arm.feels and grasp.grip_problem(grasp.target(scene:object(spec.object), share))
-      if no_grip then arm:give_up(spec.object .. " " .. no_grip) end
-      arm:note("grip_share", share)
-    end
+    if not (spec.closure or close) and grasp.window(scene:object(spec.object)) then arm:note("grip_share", share) end
     local first, reason = scene:object(spec.object).centre, nil
     for _ = 1, ATTEMPTS do
       -- An object that has slid or rolled away is not followed.

@@ -43,14 +43,18 @@ local function check(name, objects)
     end
     local types = { "string", "string", "number", "number", yaw = "number", on = "string" }
     for key, value in pairs(object) do
-      if type(value) ~= types[key] then
-        wrong(place, ("expected name, asset, x and y (mm) such as %s, and the fields yaw and on"):format(entry))
+      if not types[key] then
+        wrong(place, ("unknown key %s; an entry has name, asset, x and y (mm), yaw and on"):format(key))
+      elseif type(value) ~= types[key] then
+        local got = ("expected a %s, got %s; an entry is such as %s"):format(types[key], type(value), entry)
+        wrong(("[%d].%s"):format(k, key), got)
       end
     end
     if #object ~= 4 then wrong(place, ("expected name, asset, x and y (mm) such as %s"):format(entry)) end
     local x, y = object[3], object[4]
     local most = math.max(math.abs(x), math.abs(y))
-    if most > 0 and most < 1 then
+    -- On another object, places are small; residues of a computation are 0.
+    if not object.on and most > 1e-3 and most < 1 then
       wrong(place, ("x and y are in mm, got %g, %g; did you mean %g, %g?"):format(x, y, x / mm, y / mm))
     end
     if most > FAR then wrong(place, ("%g, %g mm is out of the scene"):format(x, y)) end

@@ -34,9 +34,10 @@ pub fn scene_warnings(task: &Task, scene: &Scene, cache: &AssetCache) -> BTreeSe
             .map(move |warning| format!("asset {name}: {warning}"))
     };
     let mut all: BTreeSet<String> = scene.objects.iter().flat_map(|object| warnings(&object.asset)).collect();
-    all.extend(scene.objects.iter().filter_map(|Object { nominal, .. }| {
-        // What changes the friction of an asset in a scene is told by the run.
-        nominal.friction_warning().map(|warning| format!("asset {}: {warning}", nominal.name))
+    all.extend(scene.objects.iter().filter_map(|Object { nominal, asset, .. }| {
+        // Friction that the layout has made good is no mistake; what else changes it is told by the run.
+        let warning = nominal.friction_warning().filter(|_| asset.friction_warning().is_some())?;
+        Some(format!("asset {}: {warning}", nominal.name))
     }));
     let (targets, goals) = (task.targets(), task.goal.predicates());
     let is_target = |object: &&Object| targets.contains(&object.name.as_str());

@@ -9,7 +9,7 @@ use crate::{
     config::{ConfiguredScript, RunConfig},
     episode_list::{EpisodeJob, EpisodeList},
     error::RunError,
-    friction::{HiddenFriction, friction_warnings},
+    friction::{friction_warnings, layout_friction_warnings},
     scene_pool::ScenePool,
     selection::select_episodes,
     suite_run::SuiteRun,
@@ -99,7 +99,8 @@ fn check_scenes(run: &SuiteRun, scenes: &ScenePool, jobs: &EpisodeList) -> Resul
         let setup =
             scenes.with(|builder| builder.build(&run.episode_id(task, episode), &run.changes()))??;
         let mut warnings = scene_warnings(task, &setup.scene, &run.assets);
-        warnings.extend(friction_warnings(run, task, &setup, HiddenFriction::Part));
+        warnings.extend(friction_warnings(run, task, &setup));
+        warnings.extend(layout_friction_warnings(run, &setup));
         let of_task = |warning: String| format!("task {}: {warning}", task.id);
         if !run.config.rigid_twin {
             warnings.extend(no_soft_target(run.suite, task, &setup.scene).map(of_task));

@@ -5,39 +5,25 @@ use std::collections::BTreeSet;
 use crate::suite_run::SuiteRun;
 use softvt_benchmark::Task;
 use softvt_common::text::{format_number, significant};
-use softvt_physics::contact::Friction;
-use softvt_scene::Object;
+use softvt_scene::{Body, Object};
 use softvt_script::EpisodeSetup;
 
-/// What has no effect.
-#[derive(Clone, Copy, PartialEq, Eq)]
-pub(crate) enum HiddenFriction {
-    /// All of a change of the run.
-    Whole,
-    /// A part of a change, also one by the layout.
-    Part,
-}
-
-/// Warnings about friction that the layout, the variation or the shifts of an episode set and another surface hides.
-pub(crate) fn friction_warnings(
-    run: &SuiteRun,
-    task: &Task,
-    setup: &EpisodeSetup,
-    hidden: HiddenFriction,
-) -> BTreeSet<String> {
-    let nominal = setup.nominal.objects.iter();
-    let mut all: BTreeSet<String> =
-        nominal.clone().filter_map(|object| variation_warning(run, setup, object, hidden)).collect();
-    if hidden == HiddenFriction::Part {
-        all.extend(nominal.clone().filter_map(|object| layout_warning(setup, object)));
-    }
+/// Warnings about changes by the variation or the shifts of an episode that another surface hides as a whole.
+pub(crate) fn friction_warnings(run: &SuiteRun, task: &Task, setup: &EpisodeSetup) -> BTreeSet<String> {
+    let of_variation =
+        setup.nominal.objects.iter().filter_map(|object| variation_warning(run, setup, object));
     let targets = task.targets();
     let shifted = setup.scene.objects.iter().filter(|object| targets.contains(&object.name.as_str()));
-    all.extend(shifted.filter_map(|object| {
+    let of_shifts = shifted.filter_map(|object| {
         let before = setup.nominal.objects.iter().find(|other| other.name == object.name)?;
         shift_warning(run, before, object)
-    }));
-    all
+    });
+    of_variation.chain(of_shifts).collect()
+}
+
+/// Warnings about friction that the layout gives to objects and another surface hides.
+pub(crate) fn layout_friction_warnings(run: &SuiteRun, setup: &EpisodeSetup) -> BTreeSet<String> {
+    setup.nominal.objects.iter().filter_map(|object| layout_warning(run, setup, object)).collect()
 }
 
 /// Rounding of coefficients.
@@ -46,23 +32,33 @@ const ROUNDING: f64 = 1e-9;
 /// The fix of all of them.
 const FIX: &str = "that of an asset with coated = true, or with a coating, counts in every pair";
 
-/// A warning about the friction of a target that the shifts lower below that of the pads.
+/// What holds and carries free objects.
+const SUPPORTS: &str = "pads and tables";
+
+/// The least static coefficient of what holds and carries free objects: the pads and the objects that are fixed.
+fn least_of_supports(run: &SuiteRun, setup: &EpisodeSetup) -> f64 {
+    let is_fixed = |object: &&Object| matches!(object.asset.body, Body::Static | Body::Articulated(_));
+    let fixed = setup.nominal.objects.iter().filter(is_fixed);
+    fixed.map(|object| object.asset.friction.static_mu).fold(run.settings.robot.pads.static_mu, f64::min)
+}
+
+/// A warning about the friction of a target that the shifts lower, where that of the pads is larger all the same.
 fn shift_warning(run: &SuiteRun, before: &Object, after: &Object) -> Option<String> {
-    let (pads, own) = (&run.settings.robot.pads, after.asset.friction.static_mu);
-    let pads = Friction::new(pads.static_mu, pads.dynamic_mu);
-    let hidden = after.asset.hidden_friction(own, &pads, "the pads");
-    let hidden = hidden.filter(|_| own < before.asset.friction.static_mu)?;
-    let shifts: Vec<String> = run
-        .config
-        .shifts
-        .iter()
+    let [was, is] = [before, after].map(|object| object.asset.friction.static_mu);
+    let pads = run.settings.robot.pads.static_mu;
+    let hidden = after.asset.hidden_friction(is, pads, "the pads");
+    let hidden = hidden.filter(|_| is < was && was <= pads + ROUNDING)?;
+    let shifts = || run.config.shifts.iter();
+    let named = shifts().any(|shift| shift.name == "friction");
+    let shifts: Vec<String> = shifts()
+        .filter(|shift| !named || shift.name == "friction")
         .map(|shift| format!("{}={}", shift.name, format_number(shift.value)))
         .collect();
     Some(format!(
         "shift {}: grips of {} are no looser with its static_mu of {}, since {hidden}; {FIX}",
         shifts.join(", "),
         after.name,
-        significant(own, 3)
+        significant(is, 3)
     ))
 }
 
@@ -72,24 +68,15 @@ fn factor_of(setup: &EpisodeSetup, object: &Object) -> f64 {
     drawn.map_or(1.0, |drawn| drawn.friction_factor)
 }
 
-/// A warning about factors on the friction of an object that have no effect.
-fn variation_warning(
-    run: &SuiteRun,
-    setup: &EpisodeSetup,
-    object: &Object,
-    hidden: HiddenFriction,
-) -> Option<String> {
+/// A warning about factors on the friction of an object, none of which has an effect.
+fn variation_warning(run: &SuiteRun, setup: &EpisodeSetup, object: &Object) -> Option<String> {
     let ranges = run.suite.vary.as_ref()?;
     setup.variation.as_ref()?.objects.get(&object.name)?;
-    let (asset, others) = (&object.asset, Friction::STANDARD);
-    let in_layout = asset.friction.static_mu / factor_of(setup, object);
+    let in_layout = object.asset.friction.static_mu / factor_of(setup, object);
     let [lowest, highest] = [ranges.friction.min, ranges.friction.max].map(|factor| factor * in_layout);
-    let reason = asset.hidden_friction(lowest, &others, "tables and pads");
-    let reason = reason.filter(|_| lowest < in_layout)?;
-    let is_hidden = match hidden {
-        HiddenFriction::Whole => highest < others.static_mu + ROUNDING,
-        HiddenFriction::Part => true,
-    };
+    let others = least_of_supports(run, setup);
+    let reason = object.asset.hidden_friction(lowest, others, SUPPORTS)?;
+    let is_hidden = lowest < in_layout - ROUNDING && highest.max(in_layout) <= others + ROUNDING;
     is_hidden.then(|| {
         format!(
             "variation {}: its factors on friction give objects a static_mu in {}..{}, and {reason}; {FIX}",
@@ -101,11 +88,11 @@ fn variation_warning(
 }
 
 /// A warning about the friction that the layout gives to an object.
-fn layout_warning(setup: &EpisodeSetup, object: &Object) -> Option<String> {
+fn layout_warning(run: &SuiteRun, setup: &EpisodeSetup, object: &Object) -> Option<String> {
     let in_layout = object.asset.friction.static_mu / factor_of(setup, object);
     let is_changed = (in_layout - object.nominal.friction.static_mu).abs() > ROUNDING;
-    let hidden = object.asset.hidden_friction(in_layout, &Friction::STANDARD, "tables and pads");
-    let hidden = hidden.filter(|_| is_changed)?;
+    let others = least_of_supports(run, setup);
+    let hidden = object.asset.hidden_friction(in_layout, others, SUPPORTS).filter(|_| is_changed)?;
     Some(format!(
         "object {}: its static_mu is {}, and {hidden}; {FIX}",
         object.name,

@@ -12,7 +12,7 @@ use crate::{
     episode_artifacts::EpisodeArtifacts,
     episode_list::{EpisodeJob, EpisodeList},
     error::{RunError, RunErrorCause},
-    friction::{HiddenFriction, friction_warnings},
+    friction::friction_warnings,
     limits::{CalibrationFiles, Calibrations, LimitScan, SceneLimits},
     policy::{ControllerFactory, DeclaredStreams},
     recorded_runs::{RecordedRuns, ReplaySource},
@@ -482,7 +482,7 @@ impl<'a> SuiteRun<'a> {
             let first = self.jobs.episodes_of(task.id).next().unwrap_or(0);
             let opened = self.open_episode(&self.episode_id(task, first))?;
             has_changed |= opened.is_shifted();
-            warnings.extend(friction_warnings(self, task, &opened, HiddenFriction::Whole));
+            warnings.extend(friction_warnings(self, task, &opened));
             self.check_object_type(task, &opened.nominal)?;
             let scene = Arc::new(opened.scene.clone());
             self.check_declared_cameras(&scene, task)?;

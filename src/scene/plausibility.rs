@@ -28,18 +28,18 @@ impl Asset {
     /// A warning about a slippery surface that is not.
     pub fn friction_warning(&self) -> Option<String> {
         let own = self.friction.static_mu;
-        let hidden = self.hidden_friction(own, &Friction::STANDARD, "tables and pads")?;
+        let hidden = self.hidden_friction(own, Friction::STANDARD.static_mu, "tables and pads")?;
         let own = format_number(own);
         Some(format!("friction.static_mu is {own}, and {hidden}; for a slippery surface add coated = true"))
     }
 
-    /// Why a static coefficient has no effect on a free object: `others` have a larger one.
-    pub fn hidden_friction(&self, static_mu: f64, other: &Friction, others: &str) -> Option<String> {
+    /// Why a static coefficient has no effect on a free object: `others` have a larger one, of at least `other_mu`.
+    pub fn hidden_friction(&self, static_mu: f64, other_mu: f64, others: &str) -> Option<String> {
         let is_free = matches!(self.body, Body::Soft(_) | Body::Rigid { .. });
-        (is_free && !self.friction.coated && static_mu < other.static_mu).then(|| {
+        (is_free && !self.friction.coated && static_mu < other_mu).then(|| {
             format!(
                 "a pair of surfaces takes the larger coefficient, which is at least {} on {others}",
-                format_number(other.static_mu)
+                format_number(other_mu)
             )
         })
     }

@@ -457,22 +457,29 @@ fn friction_that_loosens_no_grip_is_told_with_what_set_it() {
     };
     let of_asset = |range: &str| {
         format!(
-            "variation v: its factors on friction give objects a static_mu in {range}, and {reason} 0.6 on tables"
+            "variation v: its factors on friction give objects a static_mu in {range}, and {reason} 0.6 on pads and tables"
         )
     };
     let messages = |range: &str| varied(range).policy("noop").finish().messages;
     assert!(messages("{ 0.1, 0.11 }").contains(&of_asset("0.06..0.066")), "{}", messages("{ 0.1, 0.11 }"));
     assert!(!messages("{ 0.7, 1.4 }").contains(reason), "a part of them changes how objects slide on tables");
-    let checked = varied("{ 0.7, 1.4 }").check().expect("valid").join("\n");
-    assert!(
-        checked.contains(&of_asset("0.42..0.84")) && !checked.contains("asset cube: friction"),
-        "{checked}"
-    );
+    let checked = |range: &str| varied(range).check().expect("valid").join("\n");
+    let told = checked("{ 0.1, 0.11 }");
+    assert!(told.contains(&of_asset("0.06..0.066")) && !told.contains("asset cube: friction"), "{told}");
+    assert!(!checked("{ 0.7, 1.4 }").contains(reason));
     let of_layout = |at| warnings(&Small { at, ..Small::default() }.project());
     let by_layout = of_layout("at = { 0, 0.1 } } scene:object('cube').static_mu = 0.5 local _ = {");
     assert!(by_layout.contains("object cube: its static_mu is 0.5, and a pair"), "{by_layout}");
-    let coated = of_layout("at = { 0, 0.1 } } scene:object('cube').coating = 0.05 local _ = {");
-    assert!(!coated.contains(reason), "{coated}");
+    for change in [
+        "at = { 0, 0.1 } } scene:object('cube').coating = 0.05 local _ = {",
+        "at = { 0, 0.1 } } scene:object('cube').static_mu = 0.9 local _ = {",
+    ] {
+        let effective = of_layout(change);
+        assert!(!effective.contains(reason), "{effective}");
+    }
+    // Sliding on a table with less friction depends on it.
+    let smooth = "at = { 0, 0.1 } } scene:object('table').static_mu = 0.1 scene:object('cube').static_mu = 0.5 local _ = {";
+    assert!(!of_layout(smooth).contains(reason), "{}", of_layout(smooth));
 }
 
 #[test]
@@ -503,10 +510,11 @@ fn objects_of_a_kitchen_are_placed_in_mm() {
     let with = |roll: &str| refusal(&of(&format!("{{ {plate}, {roll} }}")));
     assert_snapshot!(with("{ 'roll', 'small_ridged_roll', -0.2, 0.08 }"), @"x.lua:2: layouts.cabinet: objects[2]: x and y are in mm, got -0.2, 0.08; did you mean -200, 80?");
     assert_snapshot!(with("{ 'roll', 'small_ridged_roll', -200 }"), @r#"x.lua:2: layouts.cabinet: objects[2]: expected name, asset, x and y (mm) such as { "bun", "golden_bun", -90, 230 }"#);
-    assert_snapshot!(with("{ 'roll', 'small_ridged_roll', -200, 80, yaw_range = 1 }"), @r#"x.lua:2: layouts.cabinet: objects[2]: expected name, asset, x and y (mm) such as { "bun", "golden_bun", -90, 230 }, and the fields yaw and on"#);
+    assert_snapshot!(with("{ 'roll', 'small_ridged_roll', -200, 80, yaw_range = 1 }"), @r#"x.lua:2: layouts.cabinet: objects[2]: unknown key yaw_range; an entry has name, asset, x and y (mm), yaw and on"#);
+    assert_snapshot!(with("{ 'roll', 'small_ridged_roll', -200, 80, on = false }"), @r#"x.lua:2: layouts.cabinet: objects[2].on: expected a string, got boolean; an entry is such as { "bun", "golden_bun", -90, 230 }"#);
     assert_snapshot!(with("{ 'roll', 'small_ridged_roll', -200, 8000 }"), @"x.lua:2: layouts.cabinet: objects[2]: -200, 8000 mm is out of the scene");
     assert_snapshot!(refusal(&of("{ 'roll', 'small_ridged_roll', -200, 80 }")), @r#"x.lua:2: layouts.cabinet: objects[1]: expected a table; the list has a table for each object: { { "bun", "golden_bun", -90, 230 } }"#);
-    let inside = "{ 'roll', 'small_ridged_roll', 0, 0, on = 'plate' }";
+    let inside = "{ 'roll', 'small_ridged_roll', 0.5, 0, on = 'plate' }";
     assert!(
         of(&format!("{{ {plate}, {inside} }}"))
             .run("x.lua")

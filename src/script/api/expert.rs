@@ -97,18 +97,17 @@ impl Coroutine {
         *lock(&self.readings) = readings;
     }
 
-    /// Returns the next command. If the arm could not follow the last one, the expert has given up, as
-    /// [`Self::abort`] says.
+    /// Returns the next command; `None` at the end of the expert, also if it gave up.
     pub(crate) fn next_command(
         &mut self,
         lua: &Lua,
         input: ExpertInput,
         monitor: &mut TrackingErrorMonitor,
     ) -> mlua::Result<Option<ExpertCommand>> {
-        if let Some(complaint) = input.complaint {
-            self.abort(lua, &complaint)?;
-        }
-        let command = self.step(lua, &input.view)?;
+        let command = match input.complaint {
+            Some(complaint) => self.refuse(lua, &input.view, &complaint)?,
+            None => self.step(lua, &input.view)?,
+        };
         if command.is_some() {
             monitor.command = command;
         }
@@ -122,10 +121,20 @@ impl Coroutine {
         }
         let is_first = self.running.is_none();
         let values = self.resume(lua, view)?;
+        if is_first && self.waiting().is_none() {
+            self.gave_up = Some(self.no_command_message());
+        }
+        self.read_command(lua, view, values)
+    }
+
+    /// Reads the command that the expert yielded; `None` at its end.
+    fn read_command(
+        &mut self,
+        lua: &Lua,
+        view: &ExpertView,
+        values: MultiValue,
+    ) -> mlua::Result<Option<ExpertCommand>> {
         if self.waiting().is_none() {
-            if is_first {
-                self.gave_up = Some(self.no_command_message());
-            }
             return Ok(None);
         }
         let mut values = values.into_iter();
@@ -165,20 +174,34 @@ impl Coroutine {
         self.running.as_ref().map(|(thread, _)| thread).filter(|thread| thread.is_resumable())
     }
 
-    /// Ends the expert as `arm:give_up` does, with `complaint` and the line of the script as the reason, unless the
-    /// script catches the error.
-    fn abort(&mut self, lua: &Lua, complaint: &str) -> mlua::Result<()> {
+    /// Raises `complaint` where the script waits, and returns the next command of a script that catches it. Any other
+    /// script has given up, with `complaint` and its line as the reason.
+    ///
+    /// # Errors
+    /// The script catches the complaint and fails for another reason.
+    fn refuse(
+        &mut self,
+        lua: &Lua,
+        view: &ExpertView,
+        complaint: &str,
+    ) -> mlua::Result<Option<ExpertCommand>> {
         if self.gave_up.is_some() {
-            return Ok(());
+            return Ok(None);
+        }
+        if let Some((_, shared)) = &self.running {
+            *lock(shared) = view.clone();
         }
         let error = match self.raise(complaint) {
-            Some(Ok(_)) => return Ok(()),
+            Some(Ok(values)) => return self.read_command(lua, view, values),
             Some(Err(error)) => error,
             None => fail(lua, complaint),
         };
         let reason = explain(lua, &error)?.to_string();
+        if !reason.contains(complaint) {
+            return Err(error);
+        }
         self.gave_up = Some(reason.chars().take(MAX_REASON_CHARS).collect());
-        Ok(())
+        Ok(None)
     }
 
     /// Raises `complaint` where the script waits; `None` if it does not wait.
