@@ -45,16 +45,16 @@ const MIN_RADIUS: f32 = 1.5;
 /// Maximum radius of a filter one vector wide, texels.
 const MAX_RADIUS_ONE_VECTOR: f32 = 3.4;
 /// Maximum distance, texels, of points between which all are fully lit or fully dark if both ends are: filters around
-/// both ends overlap or leave a gap of less than two texels.
-const MAX_UNIFORM_DISTANCE: f32 = 4.6;
+/// both ends leave a gap of less than half a texel.
+const MAX_UNIFORM_DISTANCE: f32 = 3.4;
 /// Maximum distance, texels, of points between which visibility is interpolated: steps are about as wide as this.
 const MAX_LINEAR_DISTANCE: f32 = 2.5;
 /// Maximum difference of visibility from its interpolation.
 const MAX_LINEAR_DEVIATION: f32 = 0.03;
 /// Maximum distance of neighbouring points from the plane of one of them, m.
-const MAX_PLANE_DISTANCE: f32 = 4e-3;
+const MAX_PLANE_DISTANCE: f32 = 2e-3;
 /// Minimum cosine between the normals of neighbouring points.
-const MIN_NEIGHBOUR_COSINE: f32 = 0.9;
+const MIN_NEIGHBOUR_COSINE: f32 = 0.97;
 /// Minimum sine of the light's elevation; flatter light is clamped.
 const MIN_ELEVATION_SINE: f32 = 0.15;
 /// Height of empty texels, m.
