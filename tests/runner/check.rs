@@ -478,7 +478,8 @@ fn friction_that_loosens_no_grip_is_told_with_what_set_it() {
         assert!(!effective.contains(reason), "{effective}");
     }
     // Sliding on a floor with less friction depends on it.
-    let smooth = "at = { 0, 0.1 } } scene:object('floor').static_mu = 0.1 scene:object('cube').static_mu = 0.5 local _ = {";
+    let smooth = "at = { 0, 0.1 } } local f = scene:object('floor') f.dynamic_mu = 0.1 f.static_mu = 0.1 \
+                  scene:object('cube').static_mu = 0.5 local _ = {";
     assert!(!of_layout(smooth).contains(reason), "{}", of_layout(smooth));
 }
 
