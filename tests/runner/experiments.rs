@@ -37,19 +37,40 @@ fn a_point_may_be_written_returned_and_lack_a_field() {
     assert_eq!(rows("grid = { a = { 1 }, b = { 5 } }")[0]["c"].as_f64(), Some(5.0));
 }
 
+/// An experiment with a row for each `x`, which tells how a drive by an expert ended. `far` is a pose out of reach.
+fn drive(x: &str, expert: &str) -> Project {
+    experiment(&format!(
+        "grid = {{ x = {{ {x} }} }}, run = function(point)
+          local floor = softvt.asset {{ name = 'floor', shape = softvt.shape.box {{ size = {{ 1, 1, 0.1 }} }}, body = softvt.static {{}} }}
+          local layout = softvt.layout('l', function(scene) scene:add {{ name = 'floor', asset = floor, position = {{ 0, 0, -0.05 }} }} end)
+          local sim, far = softvt.simulate {{ layout = layout }}, softvt.pose {{ position = {{ 5, 0, 0.3 }} }}
+          local run, ok, why = pcall(sim.drive, sim, function(arm)
+            {expert}
+          end)
+          return {{ run = run, ok = ok == true, why = why or (run and '' or ok) }}
+        end"
+    ))
+}
+
+#[test]
+fn a_script_that_catches_a_pose_out_of_reach_goes_on_with_its_next_command() {
+    let project = drive(
+        "'give up', 'wait', 'fail'",
+        "pcall(arm.move_to, arm, far)
+            if point.x == 'give up' then arm:give_up 'mine' elseif point.x == 'fail' then error('my error', 0) end
+            arm:wait(0.2)",
+    );
+    let rows = project.run("x.lua").rows();
+    let ended = |row: usize| (rows[row]["run"].as_bool(), rows[row]["ok"].as_bool());
+    assert_eq!([ended(0), ended(1)], [(Some(true), Some(false)), (Some(true), Some(true))], "{rows:?}");
+    assert_eq!(rows[0]["why"], "the expert gave up: mine");
+    let error = rows[2]["why"].as_str().unwrap_or_default();
+    assert!(ended(2).0 == Some(false) && error.ends_with("x.lua:8: my error"), "{rows:?}");
+}
+
 #[test]
 fn a_pose_out_of_reach_ends_a_drive_with_the_reason() {
-    let project = experiment(
-        "grid = { x = { 5, 0.1 } }, run = function(point)
-          local floor = softvt.asset { name = 'floor', shape = softvt.shape.box { size = { 1, 1, 0.1 } }, body = softvt.static {} }
-          local layout = softvt.layout('l', function(scene) scene:add { name = 'floor', asset = floor, position = { 0, 0, -0.05 } } end)
-          local sim = softvt.simulate { layout = layout }
-          local ok, why = sim:drive(function(arm)
-            arm:move_to(softvt.pose { position = { point.x, 0, 0.3 } })
-          end)
-          return { ok = ok, why = why or '' }
-        end",
-    );
+    let project = drive("5, 0.1", "arm:move_to(softvt.pose { position = { point.x, 0, 0.3 } })");
     let rows = project.run("x.lua").rows();
     assert_eq!([rows[0]["ok"].as_bool(), rows[1]["ok"].as_bool()], [Some(false), Some(true)]);
     let reason = project.relative(rows[0]["why"].as_str().expect("a reason"));
