@@ -32,7 +32,7 @@ const DECIMALS: std::ops::Range<f64> = 1e-4..1e6;
 /// Share of the extent of the points that a linear axis adds at both ends.
 const PADDING: f64 = 0.04;
 
-/// Strokes of the second and third series, beside the classes of [`svg::image`].
+/// Style sheet for the strokes of the second and third series; [`svg::image`] has the other classes.
 fn style() -> String {
     let colours = svg::on_both_grounds(|of| {
         format!(".second{{stroke:{}}}.third{{stroke:{}}}", of(&palette::INK), of(&palette::FAINT))

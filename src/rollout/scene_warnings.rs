@@ -35,7 +35,7 @@ pub fn scene_warnings(task: &Task, scene: &Scene, cache: &AssetCache) -> BTreeSe
     };
     let mut all: BTreeSet<String> = scene.objects.iter().flat_map(|object| warnings(&object.asset)).collect();
     all.extend(scene.objects.iter().filter_map(|Object { nominal, asset, .. }| {
-        // Friction that the layout has made good is no mistake; what else changes it is told by the run.
+        // A layout may correct the friction of an asset. `softvt_runner` warns of other changes of it.
         let warning = nominal.friction_warning().filter(|_| asset.friction_warning().is_some())?;
         Some(format!("asset {}: {warning}", nominal.name))
     }));

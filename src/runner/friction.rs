@@ -8,7 +8,7 @@ use softvt_common::text::{format_number, significant};
 use softvt_scene::{Body, Object};
 use softvt_script::EpisodeSetup;
 
-/// Warnings about changes by the variation or the shifts of an episode that another surface hides as a whole.
+/// Warnings about the variation and the shifts of an episode, where the friction that they set has no effect.
 pub(crate) fn friction_warnings(run: &SuiteRun, task: &Task, setup: &EpisodeSetup) -> BTreeSet<String> {
     let of_variation =
         setup.nominal.objects.iter().filter_map(|object| variation_warning(run, setup, object));
@@ -21,28 +21,28 @@ pub(crate) fn friction_warnings(run: &SuiteRun, task: &Task, setup: &EpisodeSetu
     of_variation.chain(of_shifts).collect()
 }
 
-/// Warnings about friction that the layout gives to objects and another surface hides.
+/// Warnings about friction that the layout sets without effect.
 pub(crate) fn layout_friction_warnings(run: &SuiteRun, setup: &EpisodeSetup) -> BTreeSet<String> {
     setup.nominal.objects.iter().filter_map(|object| layout_warning(run, setup, object)).collect()
 }
 
-/// Rounding of coefficients.
+/// Coefficients that differ by less are equal.
 const ROUNDING: f64 = 1e-9;
 
-/// The fix of all of them.
+/// End of each warning: how to make a surface slippery.
 const FIX: &str = "that of an asset with coated = true, or with a coating, counts in every pair";
 
-/// What holds and carries free objects.
+/// Name of the surfaces of [`least_of_supports`] in warnings.
 const SUPPORTS: &str = "pads and tables";
 
-/// The least static coefficient of what holds and carries free objects: the pads and the objects that are fixed.
+/// Smallest static coefficient of the pads and of the fixed objects, which hold and carry free ones.
 fn least_of_supports(run: &SuiteRun, setup: &EpisodeSetup) -> f64 {
     let is_fixed = |object: &&Object| matches!(object.asset.body, Body::Static | Body::Articulated(_));
     let fixed = setup.nominal.objects.iter().filter(is_fixed);
     fixed.map(|object| object.asset.friction.static_mu).fold(run.settings.robot.pads.static_mu, f64::min)
 }
 
-/// A warning about the friction of a target that the shifts lower, where that of the pads is larger all the same.
+/// A warning about shifts that lower the friction of a target, where the coefficient of the pads was larger before.
 fn shift_warning(run: &SuiteRun, before: &Object, after: &Object) -> Option<String> {
     let [was, is] = [before, after].map(|object| object.asset.friction.static_mu);
     let pads = run.settings.robot.pads.static_mu;
@@ -68,7 +68,7 @@ fn factor_of(setup: &EpisodeSetup, object: &Object) -> f64 {
     drawn.map_or(1.0, |drawn| drawn.friction_factor)
 }
 
-/// A warning about factors on the friction of an object, none of which has an effect.
+/// A warning about a variation of friction of which no factor has an effect on an object.
 fn variation_warning(run: &SuiteRun, setup: &EpisodeSetup, object: &Object) -> Option<String> {
     let ranges = run.suite.vary.as_ref()?;
     setup.variation.as_ref()?.objects.get(&object.name)?;

@@ -500,7 +500,7 @@ impl<'a> SuiteRun<'a> {
         if !has_changed {
             self.refuse_shifts_without_effect()?;
         }
-        // Those about other objects of the same change would say no more.
+        // One warning suffices: the others repeat it for other objects.
         if let Some(warning) = warnings.first() {
             self.config.notice(format!("warning: {warning}"));
         }

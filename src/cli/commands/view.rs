@@ -126,8 +126,8 @@ const MOMENTS: [&str; 3] = ["start", "worst", "end"];
 /// Files of a view besides its stills.
 const FILES: [&str; 5] = [episode_page::PAGE, episode_page::VIDEO, episode_page::FRAME, ANIMATION, MCAP];
 
-/// The first file in the folder `dir` that a view would replace, where no view has been. One that was interrupted has
-/// left its stills.
+/// The first file in the folder `dir` that a view would replace, unless an earlier view wrote into the folder; an
+/// interrupted one is recognised by its stills.
 fn foreign_file(dir: &Path) -> Result<Option<PathBuf>, FileError> {
     let Some(found) = FILES.map(|name| dir.join(name)).into_iter().find(|path| path.exists()) else {
         return Ok(None);
