@@ -53,12 +53,23 @@ impl HeightBuffer {
 
     /// Draws triangles where nothing higher was drawn before. Their corners are columns, rows and heights, and run
     /// clockwise where the rows point down; other triangles face away and are skipped.
-    pub(crate) fn draw(&mut self, triangles: &[ScreenCorners]) {
+    pub(crate) fn draw(&mut self, triangles: impl Iterator<Item = ScreenCorners>) {
         let target = DrawTarget { origin: [0.0; 2], size: [self.edge; 2], inset: 0.5 };
-        for some in triangles.chunks(LANES) {
+        let mut some = [ScreenCorners::default(); LANES];
+        let mut count = 0;
+        let mut draw = |some: &[ScreenCorners]| {
             let block = TriangleBlock::new(some.iter().map(|corners| (corners, 0)), &target);
             block.triangles().for_each(|t| self.draw_triangle(&t));
+        };
+        for corners in triangles {
+            some[count] = corners;
+            count += 1;
+            if count == LANES {
+                draw(&some);
+                count = 0;
+            }
         }
+        draw(&some[..count]);
     }
 
     #[inline(always)]
@@ -106,10 +117,11 @@ mod tests {
     fn a_cleared_buffer_is_as_a_new_one() {
         let new = HeightBuffer::new(64, -1.0);
         let mut used = new.clone();
-        used.draw(&[
+        let triangles = [
             [[20.3, 9.0, 0.1], [45.8, 11.0, 0.2], [30.0, 40.0, 0.3]],
             [[50.0, 3.0, 1.0], [63.9, 4.0, 1.0], [60.0, 30.0, 2.0]],
-        ]);
+        ];
+        used.draw(triangles.into_iter());
         assert_eq!((used.drawn_rows, used.drawn_columns), ([3, 40], [20, 64]));
         let is_drawn = |i: usize| used.heights[i] > -1.0;
         assert!(is_drawn(20 * used.stride() + 30) && !is_drawn(20 * used.stride() + 10));

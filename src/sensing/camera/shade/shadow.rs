@@ -8,7 +8,7 @@ use wide::i32x8;
 
 use crate::camera::{
     math::{LANE_INDEX, LANES, V3, Vec3x8, f32x8, higher, lower, sum_lanes},
-    raster::HeightBuffer,
+    raster::{HeightBuffer, ScreenCorners},
 };
 use softvt_geometry::basis_from_reference;
 use softvt_scene::Lighting;
@@ -21,6 +21,10 @@ const MARGIN: usize = 16;
 const EDGE: usize = INNER + 2 * MARGIN;
 /// Length of a row of the map in memory.
 const STRIDE: usize = HeightBuffer::stride_of(EDGE);
+/// Columns and rows of the map per column and row of its coarse copy.
+const COARSE: usize = 2;
+/// Edge of the coarse copy.
+const COARSE_EDGE: usize = EDGE / COARSE;
 /// Edge of the tiles that store ranges of heights, texels.
 const TILE: usize = 1 << TILE_BITS;
 const TILE_BITS: i32 = 2;
@@ -38,17 +42,22 @@ const MAX_NORMAL_ERROR: f32 = 0.1;
 const MIN_COSINE: f32 = 0.02;
 /// Maximum slope of a receiver plane; steeper ones say nothing about the height of occluders.
 const MAX_RECEIVER_SLOPE: f32 = 1.5;
-/// Maximum radius of the filter and of the search for occluders, texels: two vectors wide.
+/// Maximum radius of the filter and of the search for occluders, texels.
 const MAX_RADIUS: f32 = 7.4;
+/// Maximum radius at which they read all texels; wider ones read the coarse copy, which moves borders of shadows by up
+/// to a texel. Both read eight columns.
+const MAX_FINE_RADIUS: f32 = (LANES / 2) as f32;
+const _: () = assert!(MAX_RADIUS <= (COARSE * LANES / 2) as f32);
 /// Minimum radius of the filter, texels.
 const MIN_RADIUS: f32 = 1.5;
-/// Maximum radius of a filter one vector wide, texels.
-const MAX_RADIUS_ONE_VECTOR: f32 = 3.4;
 /// Maximum distance, texels, of points between which all are fully lit or fully dark if both ends are: filters around
 /// both ends leave a gap of less than half a texel.
 const MAX_UNIFORM_DISTANCE: f32 = 3.4;
-/// Maximum distance, texels, of points between which visibility is interpolated: steps are about as wide as this.
+/// Maximum distance, texels, of points between which visibility is interpolated if it is linear at their middle.
 const MAX_LINEAR_DISTANCE: f32 = 2.5;
+/// Maximum distance of points between which visibility is interpolated unseen, in radii of their filters. The curve of
+/// a step is steepest at the border of the filter: an interpolation over half a radius is within 0.05 of it.
+const MAX_SMOOTH_DISTANCE: f32 = 0.5;
 /// Maximum difference of visibility from its interpolation.
 const MAX_LINEAR_DEVIATION: f32 = 0.03;
 /// Maximum distance of neighbouring points from the plane of one of them, m.
@@ -109,6 +118,8 @@ pub(crate) struct ShadowMap {
     /// also higher above level ground, whereas level ground never rises above itself.
     ground_slope: [f32; 2],
     texels: HeightBuffer,
+    /// Every second row and column of the texels.
+    coarse: Vec<f32>,
     ranges: TileRanges,
 }
 
@@ -146,6 +157,7 @@ impl ShadowMap {
             texels_per_metre,
             tangent: lighting.key.softness_rad.tan() as f32,
             texels: HeightBuffer::new(EDGE, EMPTY),
+            coarse: vec![EMPTY; COARSE_EDGE * COARSE_EDGE],
             ranges: TileRanges::empty(),
         }
     }
@@ -153,19 +165,31 @@ impl ShadowMap {
     /// Redraws the map with these casters, each given by its vertices (world) and triangles.
     pub(crate) fn draw<'a>(&mut self, casters: impl Iterator<Item = (&'a [V3], &'a [[u32; 3]])>) {
         self.texels.clear(EMPTY);
-        let mut facing = Vec::new();
+        let mut vertices = Vec::new();
         for (positions, triangles) in casters {
-            let vertices: Vec<[f32; 3]> = positions.iter().map(|p| self.project_vertex(p)).collect();
-            for t in triangles {
-                let corners @ [a, b, c] = t.map(|v| vertices[v as usize]);
-                // u × v points to the light, so triangles that face it have positive area.
-                if (b[0] - a[0]) * (c[1] - a[1]) - (c[0] - a[0]) * (b[1] - a[1]) > 0.0 {
-                    facing.push(corners);
-                }
-            }
+            vertices.clear();
+            vertices.extend(positions.iter().map(|p| self.project_vertex(p)));
+            // u × v points to the light, so triangles that face it have positive area.
+            let faces_light = |[a, b, c]: &ScreenCorners| {
+                (b[0] - a[0]) * (c[1] - a[1]) - (c[0] - a[0]) * (b[1] - a[1]) > 0.0
+            };
+            let corners = triangles.iter().map(|t| t.map(|v| vertices[v as usize]));
+            self.texels.draw(corners.filter(faces_light));
         }
-        self.texels.draw(&facing);
         self.update_ranges();
+        self.update_coarse();
+    }
+
+    fn update_coarse(&mut self) {
+        self.coarse.fill(EMPTY);
+        let ([from, to], [first, last]) = (self.texels.drawn_rows, self.texels.drawn_columns);
+        let columns = first / COARSE..last.div_ceil(COARSE);
+        for row in from.div_ceil(COARSE)..to.div_ceil(COARSE) {
+            let texels =
+                self.texels.heights[COARSE * (row * STRIDE + columns.start)..].iter().step_by(COARSE);
+            let line = &mut self.coarse[row * COARSE_EDGE..][columns.clone()];
+            line.iter_mut().zip(texels).for_each(|(coarse, texel)| *coarse = *texel);
+        }
     }
 
     fn project_vertex(&self, p_w: &V3) -> [f32; 3] {
@@ -288,10 +312,11 @@ impl ShadowMap {
                 bias: bias[i],
                 cone: self.tangent * self.texels_per_metre,
             };
-            receiver.visibility(self.ranges.around(tiles[i], own_height[i]))
+            receiver.light(self.ranges.around(tiles[i], own_height[i]))
         };
-        // Bit masks of the points at most `distance` texels away from point `i` on one smooth surface.
-        let neighbours = |i: usize| -> [u32; 2] {
+        // Distances of the points from point `i`, texels; infinite for those that are not on one smooth surface with
+        // it.
+        let distances = |i: usize| -> f32x8 {
             let from = |x: f32x8| x - f32x8::splat(x.to_array()[i]);
             let (du, dv) = (from(at.u), from(at.v));
             let rise = du * f32x8::splat(slopes[0][i]) + dv * f32x8::splat(slopes[1][i]);
@@ -299,60 +324,76 @@ impl ShadowMap {
             let own_normal = Vec3x8 { x: own_normal[0], y: own_normal[1], z: own_normal[2] };
             let is_smooth = (from(at.height) - rise).abs().simd_lt(f32x8::splat(MAX_PLANE_DISTANCE))
                 & n.dot(own_normal).simd_gt(f32x8::splat(MIN_NEIGHBOUR_COSINE));
-            [MAX_UNIFORM_DISTANCE, MAX_LINEAR_DISTANCE].map(|distance| {
-                let is_near = |d: f32x8| d.abs().simd_le(f32x8::splat(distance));
-                (is_smooth & is_near(du) & is_near(dv)).to_bitmask()
-            })
+            is_smooth.select(du.abs().fast_max(dv.abs()), f32x8::splat(f32::INFINITY))
         };
-        let mut points = PointSequence { occluded, neighbours, filter, visible: [1.0; LANES] };
+        let mut points = PointSequence { occluded, distances, filter, light: [FilteredLight::LIT; LANES] };
         points.evaluate(0);
         points.evaluate(LANES - 1);
         points.fill(0, LANES - 1);
-        f32x8::new(points.visible)
+        f32x8::new(points.light.map(|light| light.visible))
     }
+}
+
+/// The light that a filter lets pass.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct FilteredLight {
+    /// Visible fraction.
+    visible: f32,
+    /// Radius of the filter, texels; infinite where nothing or everything occludes.
+    radius: f32,
+}
+
+impl FilteredLight {
+    const LIT: Self = Self { visible: 1.0, radius: f32::INFINITY };
+    const DARK: Self = Self { visible: 0.0, radius: f32::INFINITY };
 }
 
 /// Eight points, of which neighbours often lie next to each other on one surface.
-struct PointSequence<N, F> {
+struct PointSequence<D, F> {
     /// Bit mask of the points that are filtered; the others are lit.
     occluded: u32,
-    /// Bit masks of the points at most [`MAX_UNIFORM_DISTANCE`] and [`MAX_LINEAR_DISTANCE`] away from a point on one
-    /// smooth surface.
-    neighbours: N,
-    /// Visible fraction at a point.
+    /// Distances from a point, texels; infinite for points that are not on one smooth surface with it.
+    distances: D,
+    /// The light at a point.
     filter: F,
-    /// Visible fractions.
-    visible: [f32; LANES],
+    light: [FilteredLight; LANES],
 }
 
-impl<N: Fn(usize) -> [u32; 2], F: Fn(usize) -> f32> PointSequence<N, F> {
+impl<D: Fn(usize) -> f32x8, F: Fn(usize) -> FilteredLight> PointSequence<D, F> {
     fn evaluate(&mut self, i: usize) {
         if self.occluded >> i & 1 == 1 {
-            self.visible[i] = (self.filter)(i);
+            self.light[i] = (self.filter)(i);
         }
     }
 
-    /// Finds the visible fractions between two points at which it is known.
+    /// Finds the light between two points at which it is known.
     fn fill(&mut self, first: usize, last: usize) {
         let between = (1 << last) - (2 << first);
         if between & self.occluded == 0 {
             return;
         }
-        let (start, end) = (self.visible[first], self.visible[last]);
-        let is_uniform = start == end && (start == 0.0 || start == 1.0);
-        let with_last = between | 1 << last;
-        let [is_close, is_closer] = (self.neighbours)(first).map(|near| with_last & !near == 0);
-        if is_uniform && is_close {
+        let (start, end) = (self.light[first], self.light[last]);
+        let distances = (self.distances)(first);
+        let is_within = |distance: f32| {
+            let near = distances.simd_le(f32x8::splat(distance)).to_bitmask();
+            (between | 1 << last) & !near == 0
+        };
+        let radius = start.radius.min(end.radius);
+        let smooth_distance = match radius < f32::INFINITY {
+            true => (radius * MAX_SMOOTH_DISTANCE).min(MAX_LINEAR_DISTANCE),
+            false if start == end => MAX_UNIFORM_DISTANCE,
+            false => 0.0,
+        };
+        if is_within(smooth_distance) {
             self.interpolate(first, last);
             return;
         }
         let middle = usize::midpoint(first, last);
         self.evaluate(middle);
-        if is_closer && last - first > 2 {
+        if last - first > 2 && is_within(MAX_LINEAR_DISTANCE) {
             let share = (middle - first) as f32 / (last - first) as f32;
-            let is_linear =
-                (self.visible[middle] - (start + (end - start) * share)).abs() < MAX_LINEAR_DEVIATION;
-            if is_linear {
+            let expected = start.visible + (end.visible - start.visible) * share;
+            if (self.light[middle].visible - expected).abs() < MAX_LINEAR_DEVIATION {
                 self.interpolate(first, middle);
                 self.interpolate(middle, last);
                 return;
@@ -363,9 +404,9 @@ impl<N: Fn(usize) -> [u32; 2], F: Fn(usize) -> f32> PointSequence<N, F> {
     }
 
     fn interpolate(&mut self, first: usize, last: usize) {
-        let (start, end) = (self.visible[first], self.visible[last]);
+        let [start, end] = [first, last].map(|i| self.light[i].visible);
         for i in (first + 1..last).filter(|i| self.occluded >> i & 1 == 1) {
-            self.visible[i] = start + (end - start) * ((i - first) as f32 / (last - first) as f32);
+            self.light[i].visible = start + (end - start) * ((i - first) as f32 / (last - first) as f32);
         }
     }
 }
@@ -428,12 +469,12 @@ struct Occluders {
 }
 
 impl PenumbraFilter<'_> {
-    /// Visible fraction of the light; `range` are the heights around the point.
-    fn visibility(&self, range: HeightRange) -> f32 {
+    /// The light that passes; `range` are the heights around the point.
+    fn light(&self, range: HeightRange) -> FilteredLight {
         let both_axes = |of: fn(&Self, usize) -> f32| of(self, 0) + of(self, 1);
         let steepest = both_axes(|f, axis| f.slope[axis].abs() + f.map.ground_slope[axis].abs());
         if range.min > self.bias + steepest * MAX_RADIUS {
-            return 0.0;
+            return FilteredLight::DARK;
         }
         let deviation = both_axes(|f, axis| (f.map.ground_slope[axis] - f.clamped_slope[axis]).abs());
         let radius_below = |height: f32| {
@@ -442,51 +483,45 @@ impl PenumbraFilter<'_> {
         let mut search_radius = radius_below(range.max);
         if search_radius <= NEAR_RADIUS {
             if range.near_max <= DEPTH_BIAS {
-                return 1.0;
+                return FilteredLight::LIT;
             }
             search_radius = radius_below(range.near_max);
         }
         let occluders = match search_radius {
-            ..=MAX_RADIUS_ONE_VECTOR => self.occluders::<1, 1>(search_radius),
-            _ => self.occluders::<2, 2>(search_radius),
+            ..=MAX_FINE_RADIUS => self.occluders::<1>(search_radius),
+            _ => self.occluders::<COARSE>(search_radius),
         };
         if occluders.weight <= 0.0 {
-            return 1.0;
+            return FilteredLight::LIT;
         }
         if !occluders.is_partial {
-            return 0.0;
+            return FilteredLight::DARK;
         }
         let mean_height = occluders.weighted_height / occluders.weight;
         let radius = (mean_height * self.cone).clamp(MIN_RADIUS, search_radius);
-        match radius {
-            ..=MAX_RADIUS_ONE_VECTOR => self.lit_share::<1, 1>(radius),
-            _ => self.lit_share::<2, 2>(radius),
-        }
+        let visible = match radius {
+            ..=MAX_FINE_RADIUS => self.lit_share::<1>(radius),
+            _ => self.lit_share::<COARSE>(radius),
+        };
+        FilteredLight { visible, radius }
     }
 
-    /// Occluders in a square of half-width `radius`, texels, `CHUNKS` vectors wide, in every `STEP`th row.
+    /// Occluders in a square of half-width `radius`, texels, of which every `STEP`th row and column is read.
     ///
     /// They are weighed by the lamp's cone alone, so that the result does not depend on the radius.
     #[inline(always)]
-    fn occluders<const CHUNKS: usize, const STEP: usize>(&self, radius: f32) -> Occluders {
-        let window = FilterWindow::<CHUNKS>::new(self, radius);
-        let in_range: [u32; CHUNKS] = window.du.map(|d| d.abs().simd_lt(f32x8::splat(radius)).to_bitmask());
+    fn occluders<const STEP: usize>(&self, radius: f32) -> Occluders {
+        let window = FilterWindow::<STEP>::new(self, radius);
+        let in_range = window.du.abs().simd_lt(f32x8::splat(radius)).to_bitmask();
         let (mut weight, mut weighted_height) = (f32x8::ZERO, f32x8::ZERO);
         let (mut is_partial, mut has_occluders) = (false, false);
-        window.for_each_row::<STEP>(self, |dv, texels| {
-            let row_rise = f32x8::splat(self.slope[1] * dv);
-            let is_row_in_range = dv.abs() < radius;
-            for c in 0..CHUNKS {
-                let heights = f32x8::new(texels[c]);
-                let is_higher = window.is_higher(c, heights, row_rise);
-                let higher = is_higher.to_bitmask();
-                if higher == 0 {
-                    is_partial |= is_row_in_range;
-                    continue;
-                }
-                is_partial |= in_range[c] & !higher != 0 && is_row_in_range;
+        window.for_each_row(self, radius, |dv, heights| {
+            let is_higher = window.is_higher(self, heights, dv);
+            let higher = is_higher.to_bitmask();
+            is_partial |= in_range & !higher != 0;
+            if higher != 0 {
                 has_occluders = true;
-                let [rise, within] = window.occlusion(self, c, heights, dv, radius);
+                let [rise, within] = window.occlusion(self, heights, dv, radius);
                 let within = is_higher & within;
                 weight += within;
                 weighted_height += within * rise;
@@ -498,110 +533,93 @@ impl PenumbraFilter<'_> {
         Occluders { weight: sum_lanes(weight), weighted_height: sum_lanes(weighted_height), is_partial }
     }
 
-    /// Share of the light that passes, by a filter of `radius` texels, `CHUNKS` vectors wide, in every `STEP`th row.
+    /// Share of the light that passes, by a filter of `radius` texels that reads every `STEP`th row and column.
     #[inline(always)]
-    fn lit_share<const CHUNKS: usize, const STEP: usize>(&self, radius: f32) -> f32 {
-        let window = FilterWindow::<CHUNKS>::new(self, radius);
+    fn lit_share<const STEP: usize>(&self, radius: f32) -> f32 {
+        let window = FilterWindow::<STEP>::new(self, radius);
         let inverse2 = 1.0 / (radius * radius);
         // The product of two parabolas: smoother than a box, and separable.
-        let weights = window.du.map(|d| (f32x8::ONE - d * d * f32x8::splat(inverse2)).fast_max(f32x8::ZERO));
+        let weights = (f32x8::ONE - window.du * window.du * f32x8::splat(inverse2)).fast_max(f32x8::ZERO);
         let (mut lit, mut occluded) = (f32x8::ZERO, f32x8::ZERO);
-        window.for_each_row::<STEP>(self, |dv, texels| {
-            let row_weight = f32x8::splat((1.0 - dv * dv * inverse2).max(0.0));
-            let row_rise = f32x8::splat(self.slope[1] * dv);
-            for c in 0..CHUNKS {
-                let heights = f32x8::new(texels[c]);
-                let weight = weights[c] * row_weight;
-                let is_higher = window.is_higher(c, heights, row_rise);
-                if !is_higher.any() {
-                    lit += weight;
-                    continue;
-                }
-                lit += weight & !is_higher;
-                let [_, within] = window.occlusion(self, c, heights, dv, f32::MAX);
-                occluded += weight * (is_higher & within);
+        window.for_each_row(self, radius, |dv, heights| {
+            let weight = weights * f32x8::splat(1.0 - dv * dv * inverse2);
+            let is_higher = window.is_higher(self, heights, dv);
+            if !is_higher.any() {
+                lit += weight;
+                return;
             }
+            lit += weight & !is_higher;
+            let [_, within] = window.occlusion(self, heights, dv, f32::MAX);
+            occluded += weight * (is_higher & within);
         });
         let (lit, occluded) = (sum_lanes(lit), sum_lanes(occluded));
         if occluded <= 0.0 { 1.0 } else { lit / (lit + occluded) }
     }
 }
 
-/// The texels around a receiver, some vectors of columns wide.
-struct FilterWindow<const CHUNKS: usize> {
-    first_column: usize,
-    /// First row, and the end of the last one.
-    rows: [usize; 2],
+/// The texels around a receiver: eight columns, of which every `STEP`th of the map is read, as of the rows.
+struct FilterWindow<const STEP: usize> {
+    /// First column and row, in steps.
+    first: [usize; 2],
     /// Columns relative to the receiver, texels.
-    du: [f32x8; CHUNKS],
+    du: f32x8,
     /// Rise of the receiver's plane from the receiver to the columns, m.
-    plane_rise: [f32x8; CHUNKS],
+    plane_rise: f32x8,
     /// Heights that exceed this by more than the rise of the plane occlude, m.
     limit: f32x8,
 }
 
-impl<const CHUNKS: usize> FilterWindow<CHUNKS> {
+impl<const STEP: usize> FilterWindow<STEP> {
     #[inline(always)]
     fn new(receiver: &PenumbraFilter, radius: f32) -> Self {
         let [u, v, height] = receiver.position;
-        // Conversions by way of `i32` take a few instructions less.
-        let first_column = (u - radius) as i32 as usize;
-        let rows = [(v - radius) as i32 as usize, (v + radius) as i32 as usize + 1];
-        let du =
-            std::array::from_fn(|c| LANE_INDEX + f32x8::splat((first_column + c * LANES) as f32 + 0.5 - u));
+        // The first texel read at most `radius` before the receiver. Conversions by way of `i32` take fewer
+        // instructions.
+        let first = [u, v].map(|x| ((x - radius - 0.5) * (1.0 / STEP as f32) + 1.0) as i32 as usize);
+        let du = LANE_INDEX * f32x8::splat(STEP as f32) + f32x8::splat((first[0] * STEP) as f32 + 0.5 - u);
         Self {
-            first_column,
-            rows,
+            first,
             du,
-            plane_rise: du.map(|d| d * f32x8::splat(receiver.slope[0])),
+            plane_rise: du * f32x8::splat(receiver.slope[0]),
             limit: f32x8::splat(height + receiver.bias),
         }
     }
 
-    /// Calls `add` with the distance from the receiver, texels, and the heights of every `STEP`th row.
+    /// Calls `add` with the distance from the receiver, texels, and the heights of every row within `radius`.
     #[inline(always)]
-    fn for_each_row<const STEP: usize>(
-        &self,
-        receiver: &PenumbraFilter,
-        mut add: impl FnMut(f32, &[[f32; LANES]; CHUNKS]),
-    ) {
-        let first = self.rows[0].next_multiple_of(STEP);
-        let heights = &receiver.map.texels.heights;
-        let mut left = heights.get(first * STRIDE + self.first_column..).unwrap_or_default();
-        let mut dv = first as f32 + 0.5 - receiver.position[1];
-        let end = self.rows[1] as f32 - receiver.position[1];
+    fn for_each_row(&self, receiver: &PenumbraFilter, radius: f32, mut add: impl FnMut(f32, f32x8)) {
+        let (heights, stride) = match STEP {
+            COARSE => (&receiver.map.coarse, COARSE_EDGE),
+            _ => (&receiver.map.texels.heights, STRIDE),
+        };
+        let mut left = heights.get(self.first[1] * stride + self.first[0]..).unwrap_or_default();
+        let mut dv = (self.first[1] * STEP) as f32 + 0.5 - receiver.position[1];
         // A counter of rows and ranges of texels in place of iterators, which take as long as the sums.
-        while dv < end {
-            let Some(texels) = left.as_chunks::<LANES>().0.first_chunk() else { break };
-            add(dv, texels);
+        while dv < radius {
+            let Some(texels) = left.first_chunk() else { break };
+            add(dv, f32x8::new(*texels));
             dv += STEP as f32;
-            left = left.get(STEP * STRIDE..).unwrap_or_default();
+            left = left.get(stride..).unwrap_or_default();
         }
     }
 
-    /// Mask of the heights in the columns of chunk `c` that occlude; `row_rise` is the rise of the plane to the row.
+    /// Mask of the heights in a row that occlude.
     #[inline(always)]
-    fn is_higher(&self, c: usize, heights: f32x8, row_rise: f32x8) -> f32x8 {
-        heights.simd_gt(self.limit + (self.plane_rise[c] + row_rise).fast_max(f32x8::ZERO))
+    fn is_higher(&self, of: &PenumbraFilter, heights: f32x8, dv: f32) -> f32x8 {
+        let rise = self.plane_rise + f32x8::splat(of.slope[1] * dv);
+        heights.simd_gt(self.limit + rise.fast_max(f32x8::ZERO))
     }
 
     /// Heights above the receiver's clamped plane, and the share of each within the lamp's cone, of a radius of at most
     /// `max_reach` texels.
     #[inline(always)]
-    fn occlusion(
-        &self,
-        of: &PenumbraFilter,
-        c: usize,
-        heights: f32x8,
-        dv: f32,
-        max_reach: f32,
-    ) -> [f32x8; 2] {
-        let column_height = self.du[c] * f32x8::splat(of.clamped_slope[0]) + f32x8::splat(of.position[2]);
+    fn occlusion(&self, of: &PenumbraFilter, heights: f32x8, dv: f32, max_reach: f32) -> [f32x8; 2] {
+        let column_height = self.du * f32x8::splat(of.clamped_slope[0]) + f32x8::splat(of.position[2]);
         let rise = heights - column_height - f32x8::splat(of.clamped_slope[1] * dv);
         let reach =
             (rise * f32x8::splat(of.cone) + f32x8::splat(MIN_RADIUS)).fast_min(f32x8::splat(max_reach));
         // Full weight inside the cone, which fades out towards its border.
-        let within = (reach * reach - self.du[c] * self.du[c] - f32x8::splat(dv * dv))
+        let within = (reach * reach - self.du * self.du - f32x8::splat(dv * dv))
             * f32x8::splat(1.0 / (MIN_RADIUS * MIN_RADIUS));
         [rise, within.fast_max(f32x8::ZERO).fast_min(f32x8::ONE)]
     }
@@ -611,50 +629,59 @@ impl<const CHUNKS: usize> FilterWindow<CHUNKS> {
 mod tests {
     use super::*;
 
-    /// Fills eight points of these visible fractions, all neighbours up to `reach` points away. Returns the result and
-    /// the number of points that were filtered.
-    fn fill(of: [f32; LANES], occluded: u32, reach: [usize; 2]) -> ([f32; LANES], usize) {
+    /// Filters eight points of these visible fractions, `spacing` texels apart, by filters of this radius. Returns the
+    /// result and the number of points that were filtered.
+    fn fill(of: [f32; LANES], occluded: u32, spacing: f32, radius: f32) -> ([f32; LANES], usize) {
         let count = std::cell::Cell::new(0);
-        let neighbours = |i: usize| {
-            reach.map(|reach| (0..LANES).filter(|j| j.abs_diff(i) <= reach).fold(0, |bits, j| bits | 1 << j))
-        };
+        let distances = |i: usize| (LANE_INDEX - f32x8::splat(i as f32)).abs() * f32x8::splat(spacing);
         let filter = |i: usize| {
             count.set(count.get() + 1);
-            of[i]
+            match of[i] {
+                0.0 => FilteredLight::DARK,
+                1.0 => FilteredLight::LIT,
+                visible => FilteredLight { visible, radius },
+            }
         };
-        let mut points = PointSequence { occluded, neighbours, filter, visible: [1.0; LANES] };
+        let mut points = PointSequence { occluded, distances, filter, light: [FilteredLight::LIT; LANES] };
         points.evaluate(0);
         points.evaluate(LANES - 1);
         points.fill(0, LANES - 1);
-        (points.visible, count.get())
+        (points.light.map(|light| light.visible), count.get())
     }
+
+    /// A spacing at which no points are neighbours.
+    const APART: f32 = 10.0;
 
     #[test]
     fn points_between_fully_lit_or_dark_neighbours_are_not_filtered() {
-        assert_eq!(fill([0.0; LANES], 0xFF, [7, 0]), ([0.0; LANES], 2));
-        assert_eq!(fill([1.0; LANES], 0xFF, [7, 0]), ([1.0; LANES], 2));
-        assert_eq!(fill([0.0; LANES], 0xFF, [4, 0]), ([0.0; LANES], 3));
+        let near = MAX_UNIFORM_DISTANCE / 7.01;
+        assert_eq!(fill([0.0; LANES], 0xFF, near, 2.0), ([0.0; LANES], 2));
+        assert_eq!(fill([1.0; LANES], 0xFF, near, 2.0), ([1.0; LANES], 2));
+        assert_eq!(fill([0.0; LANES], 0xFF, 1.5 * near, 2.0), ([0.0; LANES], 3));
         let step = [0.0, 0.0, 0.0, 0.0, 0.4, 1.0, 1.0, 1.0];
-        let (visible, count) = fill(step, 0xFF, [7, 0]);
+        let (visible, count) = fill(step, 0xFF, near, 2.0);
         assert_eq!(visible, step);
         assert!(count < LANES, "{count}");
     }
 
     #[test]
-    fn visibility_is_interpolated_only_where_it_is_linear() {
+    fn visibility_is_interpolated_where_it_is_linear_or_the_filter_wide() {
         let slope = std::array::from_fn(|i| 0.1 + 0.1 * i as f32);
-        let (visible, count) = fill(slope, 0xFF, [7, 7]);
-        assert!(visible.iter().zip(slope).all(|(a, b)| (a - b).abs() < 1e-6), "{visible:?}");
-        assert_eq!(count, 3);
+        for (radius, points) in [(2.0, 3), (5.0, 2)] {
+            let (visible, count) = fill(slope, 0xFF, MAX_LINEAR_DISTANCE / 7.01, radius);
+            assert!(visible.iter().zip(slope).all(|(a, b)| (a - b).abs() < 1e-6), "{visible:?}");
+            assert_eq!(count, points);
+        }
         let bend = [0.0, 0.0, 0.0, 0.1, 0.3, 0.6, 0.8, 0.9];
-        assert_eq!(fill(bend, 0xFF, [7, 7]).0, bend);
+        assert_eq!(fill(bend, 0xFF, MAX_LINEAR_DISTANCE / 7.01, 0.1).0, bend);
     }
 
     #[test]
     fn points_that_are_not_neighbours_are_all_filtered_and_points_without_occluders_are_lit() {
         let mixed = [0.0, 0.2, 0.9, 0.0, 1.0, 0.5, 0.3, 0.0];
-        assert_eq!(fill(mixed, 0xFF, [0, 0]), (mixed, LANES));
-        assert_eq!(fill([0.0; LANES], 0b1010_0001, [0, 0]).0, [0.0, 1.0, 1.0, 1.0, 1.0, 0.0, 1.0, 0.0]);
-        assert_eq!(fill([0.0; LANES], 0b1001_0001, [7, 7]).0, [0.0, 1.0, 1.0, 1.0, 0.0, 1.0, 1.0, 0.0]);
+        assert_eq!(fill(mixed, 0xFF, APART, MAX_RADIUS), (mixed, LANES));
+        let all = |occluded: u32, spacing: f32| fill([0.0; LANES], occluded, spacing, MAX_RADIUS).0;
+        assert_eq!(all(0b1010_0001, APART), [0.0, 1.0, 1.0, 1.0, 1.0, 0.0, 1.0, 0.0]);
+        assert_eq!(all(0b1001_0001, 0.1), [0.0, 1.0, 1.0, 1.0, 0.0, 1.0, 1.0, 0.0]);
     }
 }
