@@ -17,7 +17,7 @@ use wide::{bytemuck::cast, i32x8, u32x8};
 
 use super::lod::{CreasedMesh, Lod};
 use crate::camera::{
-    math::{LANES, V3, Vec3x8, approx_log2, f32x8},
+    math::{LANES, V3, Vec3x8, approx_log2, f32x8, higher, lower},
     shade::pattern::{self, METALNESS, MaterialSample, PatternPoint, PatternPoints, sample_visual},
 };
 use softvt_geometry::{mesh::Mesh, shape::Shape, union_find::UnionFind};
@@ -230,17 +230,21 @@ impl TextureChart {
         [d.dot(&self.u) / self.texel, d.dot(&self.v) / self.texel]
     }
 
-    /// Albedo and roughness at texture coordinates `[u, v]`, averaged over about `footprint`, m (trilinear filtering).
+    /// Albedo and roughness at texture coordinates `[u, v]`, averaged over about `footprint`, m: bilinear in a level,
+    /// and linear between levels in the half of the way between them (trilinear filtering in that half alone).
     pub(crate) fn sample(&self, [u, v]: [f32x8; 2], footprint: f32x8) -> (Vec3x8, f32x8) {
         let coarsest = f32x8::splat((self.levels.len() - 1) as f32);
         let texels = footprint * f32x8::splat(1.0 / self.texel);
         let level = approx_log2(texels.fast_max(f32x8::ONE)).fast_max(f32x8::ZERO).fast_min(coarsest);
         let lanes = level.to_array();
-        let low = lanes.into_iter().fold(f32::MAX, f32::min) as usize;
-        let high = lanes.into_iter().fold(0.0, f32::max).ceil() as usize;
+        // A level contributes up to three quarters of the way to the next one.
+        let low = (lanes.into_iter().fold(f32::MAX, lower) - 0.75).ceil().max(0.0) as usize;
+        let high = (lanes.into_iter().fold(0.0, higher) + 0.75) as usize;
         let mut sum = [f32x8::ZERO; 4];
-        for k in low..=high {
-            let weight = (f32x8::ONE - (level - f32x8::splat(k as f32)).abs()).fast_max(f32x8::ZERO);
+        for k in low..=high.min(self.levels.len() - 1) {
+            let distance = (level - f32x8::splat(k as f32)).abs();
+            let weight = f32x8::splat(1.5) - f32x8::splat(2.0) * distance;
+            let weight = weight.fast_max(f32x8::ZERO).fast_min(f32x8::ONE);
             let scale = f32x8::splat(1.0 / (1_u32 << k) as f32);
             let values = self.levels[k].sample(u * scale, v * scale, |corner| self.paint(k, corner));
             (0..4).for_each(|c| sum[c] += weight * values[c]);
@@ -253,12 +257,12 @@ impl TextureChart {
     fn painted(&self) -> impl Iterator<Item = (TilePlace, &[u32])> {
         self.levels.iter().enumerate().flat_map(|(level, mip)| {
             let tiles = mip.tiles.iter().enumerate();
-            tiles.filter_map(move |(index, tile)| Some((TilePlace { level, index }, &**tile.get()?)))
+            tiles.filter_map(move |(index, tile)| Some((TilePlace { level, index }, &tile.get()?[..])))
         })
     }
 
     /// Paints the tile of a level whose first texel is `corner`.
-    fn paint(&self, level: usize, corner: [usize; 2]) -> Box<[u32]> {
+    fn paint(&self, level: usize, corner: [usize; 2]) -> Box<Tile> {
         let finer = level.min(if level < FIRST_DENSE_LEVEL { 1 } else { 2 });
         let edge = |level: usize| self.texel * (1_u32 << level) as f32;
         let region = TexelRegion {
@@ -276,7 +280,11 @@ impl TextureChart {
         for _ in 0..finer {
             (texels, size) = halve(&texels, size);
         }
-        texels.iter().map(pack).collect()
+        let mut tile = Box::new([0; TILE_TEXELS]);
+        for (row, texels) in tile.chunks_mut(TILE_STRIDE).zip(texels.chunks(size[0])) {
+            row.iter_mut().zip(texels).for_each(|(packed, texel)| *packed = pack(texel));
+        }
+        tile
     }
 
     fn paint_flat(
@@ -525,21 +533,28 @@ pub(crate) fn restore_tiles(charts: &[TextureChart], tiles: Vec<PaintedTile>) {
     for PaintedTile { chart, place: TilePlace { level, index }, texels } in tiles {
         let level = charts.get(chart).and_then(|chart| chart.levels.get(level));
         if let Some(tile) = level.and_then(|level| level.tiles.get(index)) {
-            let _ = tile.set(texels);
+            texels.try_into().into_iter().for_each(|texels| _ = tile.set(texels));
         }
     }
 }
 
 /// Edge of a tile, texels.
 const TILE: usize = 32;
+/// Length of a row of a tile in memory: each tile also has the first row and column of the next ones, so that all
+/// texels have neighbours.
+const TILE_STRIDE: usize = TILE + 1;
+const TILE_TEXELS: usize = TILE_STRIDE * TILE_STRIDE;
+
+/// The packed texels of a tile, row by row; those beyond the level are 0.
+type Tile = [u32; TILE_TEXELS];
 
 /// A level of a mip map, in tiles of packed texels.
 #[derive(Clone, Debug)]
 struct MipLevel {
     /// Width and height, texels.
     size: [usize; 2],
-    /// Row by row. Each tile also has the first row and column of the next ones, so that all texels have neighbours.
-    tiles: Vec<OnceLock<Box<[u32]>>>,
+    /// Row by row.
+    tiles: Vec<OnceLock<Box<Tile>>>,
 }
 
 impl MipLevel {
@@ -556,7 +571,7 @@ impl MipLevel {
     /// Bilinear interpolation, clamped at the edges; (u, v) in texels. Returns albedo and roughness. `paint` makes the
     /// tile whose first texel it is given.
     #[inline(always)]
-    fn sample(&self, u: f32x8, v: f32x8, paint: impl Fn([usize; 2]) -> Box<[u32]>) -> [f32x8; 4] {
+    fn sample(&self, u: f32x8, v: f32x8, paint: impl Fn([usize; 2]) -> Box<Tile>) -> [f32x8; 4] {
         let clamped = |x: f32x8, count: usize| {
             (x - f32x8::splat(0.5)).fast_max(f32x8::ZERO).fast_min(f32x8::splat((count - 1) as f32))
         };
@@ -567,24 +582,19 @@ impl MipLevel {
         let tiles = (j >> tile_bits) * i32x8::splat(columns as i32) + (i >> tile_bits);
         let is_one_tile = tiles.simd_eq(i32x8::splat(tiles.to_array()[0])).all();
         let within = i32x8::splat(TILE as i32 - 1);
-        let (at_x, at_y) = (i & within, j & within);
+        let at = ((j & within) * i32x8::splat(TILE_STRIDE as i32) + (i & within)).to_array();
         let mut corners = [[0_u32; LANES]; 4];
         let [i, j, tiles] = [i, j, tiles].map(i32x8::to_array);
         let mut read = |lanes: std::ops::Range<usize>| {
             let corner = [i, j].map(|at| at[lanes.start] as usize / TILE * TILE);
-            let texels = self
-                .tiles
-                .get(tiles[lanes.start] as usize)
-                .map_or(&[][..], |tile| tile.get_or_init(|| paint(corner)));
-            let width = self.tile_size(corner)[0];
-            let at = (at_y * i32x8::splat(width as i32) + at_x).to_array();
+            let Some(tile) = self.tiles.get(tiles[lanes.start] as usize) else { return };
+            let texels = tile.get_or_init(|| paint(corner));
             for lane in lanes {
-                let first = at[lane] as usize;
-                let rows = texels.get(first..first + width + 2).unwrap_or_default();
-                if let (Some(top), Some(bottom)) = (rows.first_chunk::<2>(), rows.last_chunk::<2>()) {
-                    (corners[0][lane], corners[1][lane]) = (top[0], top[1]);
-                    (corners[2][lane], corners[3][lane]) = (bottom[0], bottom[1]);
-                }
+                // The limit holds already; it is stated for the compiler.
+                let first = (at[lane] as usize).min(TILE_TEXELS - TILE_STRIDE - 2);
+                (corners[0][lane], corners[1][lane]) = (texels[first], texels[first + 1]);
+                let below = first + TILE_STRIDE;
+                (corners[2][lane], corners[3][lane]) = (texels[below], texels[below + 1]);
             }
         };
         // Neighbouring points mostly have one tile.
@@ -607,13 +617,15 @@ fn blend(corners: [u32x8; 4], x: f32x8, y: f32x8) -> [f32x8; 4] {
     let mask = u32x8::splat(0xFF);
     let mut sum = [f32x8::ZERO; 4];
     for (texel, weight) in corners.into_iter().zip(weights) {
-        let byte = |texel: u32x8| f32x8::from_i32x8(cast(texel & mask)) * f32x8::splat(1.0 / 255.0);
+        let byte = |texel: u32x8| f32x8::from_i32x8(cast(texel & mask));
         let [r, g, b, roughness] = [byte(texel), byte(texel >> 8), byte(texel >> 16), byte(texel >> 24)];
         for (sum, value) in sum.iter_mut().zip([r * r, g * g, b * b, roughness]) {
             *sum += weight * value;
         }
     }
-    sum
+    let [r, g, b, roughness] = sum;
+    let squared = f32x8::splat(1.0 / (255.0 * 255.0));
+    [r * squared, g * squared, b * squared, roughness * f32x8::splat(1.0 / 255.0)]
 }
 
 #[cfg(test)]
