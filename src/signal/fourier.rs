@@ -1,6 +1,6 @@
 //! Convolution on a grid that is zero outside: real two-dimensional Fourier transforms with padding.
 
-use std::sync::Arc;
+use std::{ops::Range, sync::Arc};
 
 use realfft::{ComplexToReal, RealFftPlanner, RealToComplex};
 use rustfft::{Fft, FftPlanner};
@@ -112,9 +112,20 @@ impl PaddedFft {
 
     /// Writes the field of a spectrum, scaled by `width · height`. The spectrum is overwritten.
     pub fn inverse(&self, spectrum: &mut [Complex32], field: &mut [f32], buffers: &mut FftBuffers) {
+        self.inverse_rows(spectrum, field, 0..self.rows, buffers);
+    }
+
+    /// As [`inverse`](Self::inverse), but writes some rows of the field alone.
+    pub fn inverse_rows(
+        &self,
+        spectrum: &mut [Complex32],
+        field: &mut [f32],
+        rows: Range<usize>,
+        buffers: &mut FftBuffers,
+    ) {
         let FftBuffers { row: padded, row_spectrum, scratch } = buffers;
         self.inverse_y.process_with_scratch(spectrum, scratch);
-        for (j, row) in field.chunks_exact_mut(self.columns).enumerate() {
+        for (j, row) in field.chunks_exact_mut(self.columns).enumerate().take(rows.end).skip(rows.start) {
             for (i, value) in row_spectrum.iter_mut().enumerate() {
                 *value = spectrum[i * self.height + j];
             }

@@ -2,10 +2,10 @@
 
 use nalgebra::Vector2;
 
-use super::elastic_layer::LayerResponse;
+use super::{elastic_layer::LayerResponse, height_map::FINE};
 use softvt_common::range::RangeError;
 use softvt_robot::PadSurface;
-use softvt_robot::tactile::{GelSpec, Pinhole, TactileSpec};
+use softvt_robot::tactile::{GelSpec, OpticsModel, Pinhole, TactileSpec};
 use softvt_signal::fourier::{Complex32, FftBuffers, PaddedFft};
 
 /// Grid over the pad, kernels of the bonded layer and view of the camera: everything that is computed once per sensor.
@@ -26,6 +26,8 @@ pub struct Gel {
     pub rows: usize,
     /// Edge of a cell, m.
     pub cell: f64,
+    /// Points of the height maps of soft skins per cell along each axis.
+    pub(super) soft_skin_points: usize,
     /// Height of the undeformed surface at each cell, m, pad frame; NaN outside the outline.
     pub(in super::super) dome: Vec<f32>,
     pub(super) fft: PaddedFft,
@@ -70,7 +72,11 @@ impl Gel {
         // thicknesses away, a load moves the surface by less than 2 % of its displacement under the load.
         let fft = PaddedFft::new(columns, rows, (1.5 * pad.thickness / cell).ceil() as usize);
         let kernels = LayerKernels::new(&fft, &spec.gel, pad.thickness);
-        let mut gel = Self { pad, view: spec.view, columns, rows, cell, dome: Vec::new(), fft, kernels };
+        // Taxim shows the skins themselves; other optics show the surface of the gel, which presses details of soft
+        // skins flat.
+        let soft_skin_points = if matches!(spec.optics, OpticsModel::Taxim { .. }) { FINE } else { 1 };
+        let (view, dome) = (spec.view, Vec::new());
+        let mut gel = Self { pad, view, columns, rows, cell, soft_skin_points, dome, fft, kernels };
         let height = |at: Vector2<f64>| {
             let is_inside = pad.edge_distance(at.x, at.y) <= 0.0;
             if is_inside { pad.height(at.x, at.y) as f32 } else { f32::NAN }

@@ -4,7 +4,7 @@ use nalgebra::Vector2;
 
 use super::{
     gel::{Gel, GelScratch},
-    height_map::{HeightMap, SkinMesh},
+    height_map::{FINE, HeightMap, SkinMesh},
     normal_contact::solve_normal_contact,
     pad_wrench::{PadWrench, Taxels},
     tangential_contact::{PlanarMotion, apply_shear_kernel, solve_tangential_contact, spring_stiffness},
@@ -92,7 +92,8 @@ impl GelField {
         if let Some(body) = substrate {
             body.add_to(gel, &mut scratch.compliance);
         }
-        let mut height_map = HeightMap::new(gel, skins);
+        let points_per_cell = if substrate.is_some() { gel.soft_skin_points } else { FINE };
+        let mut height_map = HeightMap::new(gel, skins, points_per_cell);
         if skins.is_empty() {
             return Err(TactileContactError::NoSkin { force: wrench.normal() });
         }

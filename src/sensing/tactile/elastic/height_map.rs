@@ -14,17 +14,20 @@ pub struct SkinMesh<'a> {
     pub triangles: &'a [[u32; 3]],
 }
 
-/// Points of the height map per cell of the gel's grid along each axis; odd, so that one is the cell's centre.
-const SUBCELLS: usize = 3;
 /// Height above the apex beyond which triangles are skipped, m: no gripper pushes a pad in that far.
 const MAX_HEIGHT: f64 = 6e-3;
 
-/// Height of the lowest surface (m above the apex plane; infinite without one) on a grid [`SUBCELLS`] times finer
-/// than the grid of the gel.
+/// Points of a fine height map per cell of the gel's grid along each axis; odd, so that one is the cell's centre.
+pub(super) const FINE: usize = 3;
+
+/// Height of the lowest surface (m above the apex plane; infinite without one) on the grid of the gel or on one that is
+/// finer.
 #[derive(Clone, Debug, PartialEq)]
 pub(in super::super) struct HeightMap {
     pub(in super::super) columns: usize,
     pub(in super::super) rows: usize,
+    /// Points per cell of the gel's grid along each axis; odd.
+    points_per_cell: usize,
     /// Distance of neighbouring points, m.
     pub(in super::super) cell: f64,
     /// Heights, row by row.
@@ -32,18 +35,20 @@ pub(in super::super) struct HeightMap {
 }
 
 impl HeightMap {
-    /// Height map of `skins` over the pad of `gel`.
-    pub(super) fn new(gel: &Gel, skins: &[SkinMesh]) -> Self {
-        let (columns, rows) = (SUBCELLS * gel.columns, SUBCELLS * gel.rows);
-        let cell = gel.cell / SUBCELLS as f64;
-        let mut map = Self { columns, rows, cell, height: vec![f32::INFINITY; columns * rows] };
+    /// Height map of `skins` over the pad of `gel`, with `points_per_cell` points per cell of its grid along each axis,
+    /// an odd number.
+    pub(super) fn new(gel: &Gel, skins: &[SkinMesh], points_per_cell: usize) -> Self {
+        let (columns, rows) = (points_per_cell * gel.columns, points_per_cell * gel.rows);
+        let cell = gel.cell / points_per_cell as f64;
+        let height = vec![f32::INFINITY; columns * rows];
+        let mut map = Self { columns, rows, points_per_cell, cell, height };
         let floor = -gel.pad.thickness;
         for skin in skins {
-            let vertex = |v: u32| skin.vertices.get(v as usize).copied();
+            let vertex = |v: u32| skin.vertices.get(v as usize);
             for triangle in skin.triangles {
                 if let [Some(a), Some(b), Some(c)] = triangle.map(vertex)
-                    && a.z.max(b.z).max(c.z) > floor
-                    && a.z.min(b.z).min(c.z) < MAX_HEIGHT
+                    && (a.z < MAX_HEIGHT || b.z < MAX_HEIGHT || c.z < MAX_HEIGHT)
+                    && (a.z > floor || b.z > floor || c.z > floor)
                 {
                     map.draw([a, b, c]);
                 }
@@ -55,7 +60,8 @@ impl HeightMap {
     /// Height above the undeformed gel at the centre of each of its cells, m; infinite where no skin is.
     pub(super) fn gaps(&self, gel: &Gel) -> Vec<f32> {
         let gap = |(c, dome): (usize, &f32)| {
-            let [i, j] = [c % gel.columns, c / gel.columns].map(|cell| SUBCELLS * cell + SUBCELLS / 2);
+            let n = self.points_per_cell;
+            let [i, j] = [c % gel.columns, c / gel.columns].map(|cell| n * cell + n / 2);
             let gap = self.height[j * self.columns + i] - dome;
             if gap.is_nan() { f32::INFINITY } else { gap }
         };
@@ -63,7 +69,7 @@ impl HeightMap {
     }
 
     /// Lowers the map to one triangle, unless its outer side faces away from the gel.
-    fn draw(&mut self, corners: [Vec3; 3]) {
+    fn draw(&mut self, corners: [&Vec3; 3]) {
         // In units of cells, with the first centre at 0.
         let half = [0.5 * (self.columns - 1) as f64, 0.5 * (self.rows - 1) as f64];
         let [a, b, c] = corners.map(|p| [p.x / self.cell + half[0], p.y / self.cell + half[1], p.z]);
@@ -98,9 +104,9 @@ impl HeightMap {
             }
             let (first, last) = (from.ceil() as usize, to.floor() as usize);
             let start = a[2] + slope[0] * -a[0] + slope[1] * (y - a[1]);
-            let row = &mut self.height[j * self.columns..(j + 1) * self.columns];
-            for (i, height) in row.iter_mut().enumerate().take(last + 1).skip(first) {
-                *height = height.min((start + slope[0] * i as f64) as f32);
+            let row = self.height.get_mut(j * self.columns + first..=j * self.columns + last);
+            for (i, height) in (first as u32..).zip(row.unwrap_or_default()) {
+                *height = height.min((start + slope[0] * f64::from(i)) as f32);
             }
         }
     }
@@ -116,7 +122,12 @@ struct Edge {
 
 /// Whole numbers below `count` within the interval of three values; `None` for an empty range.
 fn index_range(count: usize, of: [f64; 3]) -> Option<RangeInclusive<usize>> {
-    let low = of[0].min(of[1]).min(of[2]).ceil().max(0.0);
-    let high = of[0].max(of[1]).max(of[2]).floor().min((count - 1) as f64);
+    // Comparisons take fewer instructions than `f64::min` and `f64::max`.
+    let (mut low, mut high) = (of[0], of[0]);
+    for value in [of[1], of[2]] {
+        low = if value < low { value } else { low };
+        high = if value > high { value } else { high };
+    }
+    let (low, high) = (low.ceil().max(0.0), high.floor().min((count - 1) as f64));
     (low <= high).then_some(low as usize..=high as usize)
 }

@@ -212,8 +212,10 @@ impl TangentialProblem<'_> {
         self.gel.fft.forward(&x, sx, buffers);
         self.gel.fft.forward(&y, sy, buffers);
         apply_shear_kernel(self.gel, sx, sy);
-        self.gel.fft.inverse(sx, &mut x, buffers);
-        self.gel.fft.inverse(sy, &mut y, buffers);
+        let row = |cell: Option<&usize>| cell.map_or(0, |c| c / self.gel.columns);
+        let rows = row(self.cells.first())..row(self.cells.last()) + 1;
+        self.gel.fft.inverse_rows(sx, &mut x, rows.clone(), buffers);
+        self.gel.fft.inverse_rows(sy, &mut y, rows, buffers);
         self.cells.iter().map(|&c| Vector2::new(x[c].into(), y[c].into())).collect()
     }
 }

@@ -4,6 +4,7 @@ use std::ops::Range;
 
 use image::{Rgb, RgbImage};
 use serde::{Deserialize, Serialize};
+use wide::{f32x8, i16x8, u8x16};
 
 use super::{
     super::elastic::{Gel, GelField},
@@ -50,8 +51,8 @@ pub struct OpticsFile {
 pub struct PolynomialOptics {
     /// Image without a contact, 320 × 240.
     pub(super) untouched: RgbImage,
-    /// The same before rounding to grey levels.
-    background: Vec<f32>,
+    /// The same by channel, before rounding to grey levels.
+    background: [Vec<f32>; 3],
     steepest: f32,
     colour: [[f32; SLOPE_MONOMIALS]; 3],
     /// LEDs of the red, green and blue channel, as the fit implies them.
@@ -101,8 +102,8 @@ impl PolynomialOptics {
         let background = cosine_series(&file.background);
         Ok(Self {
             untouched: RgbImage::from_fn(IMAGE_SIZE[0] as u32, IMAGE_SIZE[1] as u32, |x, y| {
-                let at = 3 * (y as usize * IMAGE_SIZE[0] + x as usize);
-                Rgb([0, 1, 2].map(|channel| grey_level(background[at + channel])))
+                let at = y as usize * IMAGE_SIZE[0] + x as usize;
+                Rgb(background.each_ref().map(|levels| grey_level(levels[at])))
             }),
             background,
             steepest: file.steepest as f32,
@@ -133,16 +134,15 @@ impl PolynomialOptics {
                     shadow_caster.cast(&self.leds[channel], row, range.start, light);
                 }
             }
-            let at = 3 * ((surface.from[1] + row) * IMAGE_SIZE[0] + surface.from[0]);
-            let (from, to) = (at + 3 * range.start, at + 3 * range.end);
-            let [red, green, blue] = &line.light;
-            let light = red[range.clone()].iter().zip(&green[range.clone()]).zip(&blue[range]);
-            let pixels =
-                (*image)[from..to].chunks_exact_mut(3).zip(self.background[from..to].chunks_exact(3));
-            for ((out, base), ((r, g), b)) in pixels.zip(light) {
-                out[0] = grey_level(base[0] * r);
-                out[1] = grey_level(base[1] * g);
-                out[2] = grey_level(base[2] * b);
+            let at = (surface.from[1] + row) * IMAGE_SIZE[0] + surface.from[0];
+            let (from, to) = (at + range.start, at + range.end);
+            for (channel, background) in self.background.iter().enumerate() {
+                line.colour(channel, &background[from..to], range.clone());
+            }
+            let [red, green, blue] = line.levels.each_ref().map(|levels| &levels[range.clone()]);
+            let pixels = (*image)[3 * from..3 * to].as_chunks_mut::<3>().0;
+            for (out, ((r, g), b)) in pixels.iter_mut().zip(red.iter().zip(green).zip(blue)) {
+                *out = [*r, *g, *b];
             }
         }
         image
@@ -156,11 +156,18 @@ struct LightRow {
     b: Vec<f32>,
     /// Light relative to the untouched image, by channel.
     light: [Vec<f32>; 3],
+    /// Grey levels by channel.
+    levels: [Vec<u8>; 3],
 }
 
 impl LightRow {
     fn new(width: usize) -> Self {
-        Self { a: vec![0.0; width], b: vec![0.0; width], light: std::array::from_fn(|_| vec![0.0; width]) }
+        Self {
+            a: vec![0.0; width],
+            b: vec![0.0; width],
+            light: std::array::from_fn(|_| vec![0.0; width]),
+            levels: std::array::from_fn(|_| vec![0; width]),
+        }
     }
 
     /// Replaces slopes by their sines, limited to `steepest`. Returns the range from the first to the last
@@ -191,33 +198,54 @@ impl LightRow {
             *light = 1.0 + a0 + a * (a1 + a * (a2 + a * (a3 + a * (a4 + a * c[19]))));
         }
     }
+
+    /// Computes the grey levels of one channel in a range of the row over their `background`.
+    fn colour(&mut self, channel: usize, background: &[f32], range: Range<usize>) {
+        const LANES: usize = 16;
+        let light = &self.light[channel][range.clone()];
+        let levels = self.levels[channel][range].chunks_mut(LANES);
+        for ((levels, background), light) in levels.zip(background.chunks(LANES)).zip(light.chunks(LANES)) {
+            let mut values = [0.0; LANES];
+            let products = background.iter().zip(light).map(|(base, light)| base * light);
+            values.iter_mut().zip(products).for_each(|(value, product)| *value = product);
+            levels.copy_from_slice(&grey_levels(&values)[..levels.len()]);
+        }
+    }
+}
+
+/// Rounds and clamps to grey levels.
+fn grey_levels(values: &[f32; 16]) -> [u8; 16] {
+    // Written out, since the compiler does not vectorise the conversion. Narrowing saturates.
+    let [low, high] = [0, 8].map(|at| {
+        let lanes = f32x8::new(std::array::from_fn(|lane| values[at + lane])) + f32x8::HALF;
+        // Truncation is as good as the floor: negative values become 0.
+        i16x8::from_i32x8_saturate(lanes.trunc_int())
+    });
+    u8x16::narrow_i16x8(low, high).to_array()
 }
 
 fn grey_level(value: f32) -> u8 {
-    // Converting to an integer first lets the compiler use vector instructions.
-    (value + 0.5).clamp(0.0, 255.0) as i32 as u8
+    grey_levels(&[value; 16])[0]
 }
 
-/// Image of a cosine series per channel, 320 × 240 RGB.
-fn cosine_series(series: &[Vec<Vec<f64>>; 3]) -> Vec<f32> {
+/// Grey levels of a cosine series per channel, 320 × 240.
+fn cosine_series(series: &[Vec<Vec<f64>>; 3]) -> [Vec<f32>; 3] {
     let [width, height] = IMAGE_SIZE;
     let rows = || series.iter().flatten();
     let along_x = cosine_waves(rows().map(Vec::len).max().unwrap_or(0), width);
     let along_y = cosine_waves(series.iter().map(Vec::len).max().unwrap_or(0), height);
-    let mut out = vec![0.0; 3 * width * height];
-    for (channel, rows) in series.iter().enumerate() {
+    series.each_ref().map(|rows| {
+        let mut levels = Vec::with_capacity(width * height);
         for y in 0..height {
             let mut line = vec![0.0; along_x.len()];
             for (row, wave) in rows.iter().zip(&along_y) {
                 line.iter_mut().zip(row).for_each(|(sum, c)| *sum += wave[y] * c);
             }
-            for x in 0..width {
-                let value: f64 = line.iter().zip(&along_x).map(|(c, wave)| c * wave[x]).sum();
-                out[3 * (y * width + x) + channel] = value as f32;
-            }
+            let level = |x: usize| line.iter().zip(&along_x).map(|(c, wave)| c * wave[x]).sum::<f64>();
+            levels.extend((0..width).map(|x| level(x) as f32));
         }
-    }
-    out
+        levels
+    })
 }
 
 /// Cosine waves of the orders 0 to `count`, at the centres of `pixels` pixels.
@@ -237,11 +265,11 @@ mod tests {
         pub(in super::super) fn colour_change(&self, a: f64, b: f64, pixel: [usize; 2]) -> [f64; 3] {
             let scale = (f64::from(self.steepest) / a.hypot(b).max(1e-12)).min(1.0);
             let slopes = slope_monomials(a * scale, b * scale);
-            let at = 3 * (pixel[1].min(IMAGE_SIZE[1] - 1) * IMAGE_SIZE[0] + pixel[0].min(IMAGE_SIZE[0] - 1));
+            let at = pixel[1].min(IMAGE_SIZE[1] - 1) * IMAGE_SIZE[0] + pixel[0].min(IMAGE_SIZE[0] - 1);
             [0, 1, 2].map(|channel| {
                 let share: f64 =
                     self.colour[channel].iter().zip(&slopes).map(|(c, s)| f64::from(*c) * s).sum();
-                f64::from(self.background[at + channel]) * share
+                f64::from(self.background[channel][at]) * share
             })
         }
     }
@@ -267,7 +295,7 @@ mod tests {
             for (i, s) in slopes.iter().enumerate() {
                 let pixel = [i, 100];
                 let single = optics.colour_change(f64::from(s[0]), f64::from(s[1]), pixel)[channel];
-                let base = optics.background[3 * (100 * IMAGE_SIZE[0] + i) + channel];
+                let base = optics.background[channel][100 * IMAGE_SIZE[0] + i];
                 let found = f64::from(base * line.light[channel][i] - base);
                 assert!((found - single).abs() < 0.05, "channel {channel}, {s:?}: {found} and {single}");
             }

@@ -139,14 +139,16 @@ impl VisibleSurface {
                 blur([0, 1, 2, 3, 4].map(|k| &line[k..n - 4 + k]), &mut row[2..n - 2]);
             }
         }
-        let mut from = self.u.clone();
-        for _ in 0..2 {
-            for j in 2..self.size[1].saturating_sub(2) {
+        let inner = 2..self.size[1].saturating_sub(2);
+        let blur_rows = |from: &[f32], to: &mut [f32]| {
+            for j in inner.clone() {
                 let rows = [0, 1, 2, 3, 4].map(|k| &from[(j + k - 2) * n..(j + k - 1) * n]);
-                blur(rows, &mut self.u[j * n..(j + 1) * n]);
+                blur(rows, &mut to[j * n..(j + 1) * n]);
             }
-            from.copy_from_slice(&self.u);
-        }
+        };
+        let mut once = self.u.clone();
+        blur_rows(&self.u, &mut once);
+        blur_rows(&once, &mut self.u);
     }
 
     /// Writes the slopes along x and y of a row of pixels, by central differences; 0 at the border of the window,
@@ -192,15 +194,16 @@ fn resample(field: &[f32], count: [usize; 2], x: &[PixelTaps], y: &[PixelTaps]) 
             }
         }
     }
-    let mut out = vec![0.0; wide * y.len()];
-    for (row, PixelTaps { first, weights }) in out.chunks_exact_mut(wide).zip(y) {
-        for (k, &w) in weights.iter().enumerate() {
-            let j = first + k as isize;
-            if (0..count[1] as isize).contains(&j) {
-                let line = &lines[j as usize * wide..(j as usize + 1) * wide];
-                row.iter_mut().zip(line).for_each(|(out, value)| *out += w * value);
-            }
-        }
+    let outside = vec![0.0; wide];
+    let line = |j: isize| {
+        let is_inside = (0..count[1] as isize).contains(&j);
+        if is_inside { &lines[j as usize * wide..(j as usize + 1) * wide] } else { &outside }
+    };
+    let mut out = Vec::with_capacity(wide * y.len());
+    for PixelTaps { first, weights: [wa, wb, wc, wd] } in y {
+        let [a, b, c, d] = [0, 1, 2, 3].map(|k| line(first + k));
+        let taps = a.iter().zip(b).zip(c.iter().zip(d));
+        out.extend(taps.map(|((a, b), (c, d))| wa * a + wb * b + wc * c + wd * d));
     }
     out
 }
