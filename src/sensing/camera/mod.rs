@@ -16,8 +16,8 @@
 //!    interpolated between rows (`render::rows`).
 //!
 //! Materials are procedural functions of the object frame. [`RenderMesh`] bakes them into vertices or
-//! textures once, filtered to the spacing of the samples. Objects that do not move are drawn once for a
-//! camera that does not move either.
+//! textures once, filtered to the spacing of the samples. Objects that do not move, be they fixed or
+//! [at rest](RestState), are drawn once for a camera that does not move either.
 //!
 //! # Example
 //!
@@ -80,5 +80,5 @@ pub use mesh::{
 };
 pub(crate) use mesh::{lod::Lod, render_mesh::RenderSolid};
 pub use render::Renderer;
-pub use scene::{FrameView, RenderObject, RenderScene, check_light};
+pub use scene::{FrameView, RenderObject, RenderScene, RestState, check_light};
 pub use softvt_signal::resize::resize;

@@ -1,7 +1,7 @@
 //! The scene to be drawn: objects, their poses in a state, and the light.
 
 use std::sync::{
-    Arc, OnceLock,
+    Arc, Mutex, OnceLock, PoisonError,
     atomic::{AtomicU64, Ordering},
 };
 
@@ -42,24 +42,28 @@ pub struct RenderObject {
 }
 
 impl RenderObject {
-    /// True unless the object is fixed in the world.
-    pub(crate) fn is_moving(&self) -> bool {
-        self.body != BodyId::World
+    /// True if the object is fixed in the world.
+    pub(crate) fn is_fixed(&self) -> bool {
+        self.body == BodyId::World
     }
 }
 
 /// All objects and the light of a scene, with everything that does not change during an episode precomputed.
 ///
-/// Immutable: one scene can be shared by several [`Renderer`](super::Renderer)s.
+/// One scene can be shared by several [`Renderer`](super::Renderer)s and threads.
 #[derive(Debug)]
 pub struct RenderScene {
     pub(crate) objects: Vec<RenderObject>,
     pub(crate) lighting: Lighting,
-    /// Levels of detail in the world of each fixed object, posed on first use; unused for moving ones.
-    fixed_meshes: FixedMeshes,
-    pub(crate) fixed_shadow: ShadowMap,
+    rest: RestState,
+    /// Levels of detail in the world of each fixed object, and of others at rest, posed on first use.
+    still_meshes: StillMeshes,
+    /// Shadows of the fixed objects.
+    pub(crate) fixed_shadow: Arc<ShadowMap>,
     /// Coarser shadows of fixed objects beyond the fine map, if there are any.
     pub(crate) wide_shadow: Option<ShadowMap>,
+    /// Shadows of the objects that stood still in recent images, if others than the fixed ones did.
+    still_shadows: Mutex<Vec<StillShadow>>,
     pub(crate) illumination: Illumination,
     pub(crate) tone_mapper: ToneMapper,
     /// Identifies the scene in the caches of renderers.
@@ -85,6 +89,66 @@ pub struct FrameView<'a> {
     pub hidden_id: u16,
 }
 
+/// A state in which bodies may stay for long, such as the settled one. While they do, images show them as they show
+/// fixed objects, which takes less time. Bodies that it lacks are always drawn as moving ones.
+#[derive(Clone, Debug, Default)]
+pub struct RestState {
+    /// Node positions of each soft body, world, m.
+    pub nodes: Vec<Vec<Vec3>>,
+    /// Poses of the rigid bodies, world.
+    pub rigid: Vec<Pose>,
+    /// Link poses of each articulation, world.
+    pub links: Vec<Vec<Pose>>,
+}
+
+/// Maximum change of coordinates of bodies that are drawn at rest, m and of unit quaternions: a hundredth of a pixel of
+/// the wrist camera at a distance of 3 cm.
+const MAX_REST_DEVIATION: f64 = 1e-6;
+
+impl RestState {
+    fn view(&self) -> FrameView<'_> {
+        FrameView { nodes: &self.nodes, rigid: &self.rigid, links: &self.links, ..FrameView::default() }
+    }
+
+    /// True if a body is in this state, up to [`MAX_REST_DEVIATION`].
+    fn holds(&self, body: BodyId, view: &FrameView) -> bool {
+        let is_near =
+            |a: &[f64], b: &[f64]| a.iter().zip(b).all(|(a, b)| (a - b).abs() <= MAX_REST_DEVIATION);
+        let is_same_pose = |rest: Option<&Pose>, now: Option<&Pose>| {
+            rest.zip(now).is_some_and(|(rest, now)| {
+                is_near(rest.translation.vector.as_slice(), now.translation.vector.as_slice())
+                    && is_near(rest.rotation.coords.as_slice(), now.rotation.coords.as_slice())
+            })
+        };
+        match body {
+            BodyId::World | BodyId::Kinematic(_) => false,
+            BodyId::Soft(id) => {
+                let nodes = self.nodes.get(id.index()).zip(view.nodes.get(id.index()));
+                nodes.is_some_and(|(rest, now)| {
+                    let mut pairs = rest.iter().zip(now);
+                    rest.len() == now.len() && pairs.all(|(a, b)| is_near(a.as_slice(), b.as_slice()))
+                })
+            }
+            BodyId::Rigid(id) => is_same_pose(self.rigid.get(id.index()), view.rigid.get(id.index())),
+            BodyId::Link(id) => {
+                let link = |links: &[Vec<Pose>]| links.get(id.articulation.index())?.get(id.index).copied();
+                is_same_pose(link(&self.links).as_ref(), link(view.links).as_ref())
+            }
+        }
+    }
+}
+
+/// The shadows of objects that stand still.
+#[derive(Debug)]
+struct StillShadow {
+    /// The objects that stand still, by index.
+    is_still: Vec<bool>,
+    map: Arc<ShadowMap>,
+}
+
+/// Number of sets of still objects whose shadows are kept.
+const KEPT_SHADOWS: usize = 4;
+
 impl RenderScene {
     /// Prepares a scene: poses its fixed objects and draws their shadow maps.
     ///
@@ -92,6 +156,18 @@ impl RenderScene {
     /// A setting of the light is out of range, the pose of a fixed object is not finite, or there are
     /// more than 1000 objects.
     pub fn new(objects: Vec<RenderObject>, lighting: Lighting) -> Result<Self, CameraError> {
+        Self::with_rest(objects, lighting, RestState::default())
+    }
+
+    /// As [`new`](Self::new), with a state in which bodies may stay.
+    ///
+    /// # Errors
+    /// As [`new`](Self::new).
+    pub fn with_rest(
+        objects: Vec<RenderObject>,
+        lighting: Lighting,
+        rest: RestState,
+    ) -> Result<Self, CameraError> {
         check_light(&lighting)?;
         // Triangle ids have bits for about as many.
         if objects.len() > MAX_OBJECTS {
@@ -100,26 +176,20 @@ impl RenderScene {
                 reason: format!("{} objects; at most {MAX_OBJECTS} can be drawn, join some", objects.len()),
             });
         }
-        let fixed_meshes = FixedMeshes::new(&objects);
+        let still_meshes = StillMeshes::new(&objects);
         let mut bounds = Vec::new();
         let mut casters = Vec::new();
-        for (index, object) in objects.iter().enumerate().filter(|(_, object)| !object.is_moving()) {
+        for (index, object) in objects.iter().enumerate().filter(|(_, object)| object.is_fixed()) {
             let level = object.mesh.caster()?;
-            let posed = fixed_meshes.get(&objects, index, level)?;
+            let posed = still_meshes.get(&objects, index, level, &rest)?;
             bounds.push(posed.clone());
             if object.casts_shadow {
                 casters.push((posed, object.mesh.level(level)?));
             }
         }
-        let draw_shadows = |mut map: ShadowMap| {
-            map.draw(
-                casters.iter().map(|(posed, lod)| (posed.positions.as_slice(), lod.triangles.as_slice())),
-            );
-            map
-        };
-        let fixed_shadow = draw_shadows(ShadowMap::new(&lighting));
+        let fixed_shadow = Arc::new(draw_shadow(ShadowMap::new(&lighting), &casters));
         let wide_shadow = wide_shadow_radius(&bounds, &lighting)
-            .map(|radius| draw_shadows(ShadowMap::with_radius(&lighting, radius)));
+            .map(|radius| draw_shadow(ShadowMap::with_radius(&lighting, radius), &casters));
         // Relaxed: only uniqueness matters.
         static NEXT_ID: AtomicU64 = AtomicU64::new(0);
         Ok(Self {
@@ -127,11 +197,46 @@ impl RenderScene {
             tone_mapper: ToneMapper::new(lighting.exposure),
             objects,
             lighting,
-            fixed_meshes,
+            rest,
+            still_meshes,
             fixed_shadow,
             wide_shadow,
+            still_shadows: Mutex::default(),
             id: NEXT_ID.fetch_add(1, Ordering::Relaxed),
         })
+    }
+
+    /// The objects that stand still in a state, by index: those that are fixed, and those at rest. Objects at rest
+    /// appear as moving ones where some are hidden or coloured by their nodes.
+    pub(crate) fn still_objects(&self, view: &FrameView) -> Vec<bool> {
+        let may_rest = view.hidden_id == 0 && view.node_colours.is_empty();
+        let is_still = |o: &RenderObject| o.is_fixed() || may_rest && self.rest.holds(o.body, view);
+        self.objects.iter().map(is_still).collect()
+    }
+
+    /// The shadows of the objects that stand still.
+    pub(crate) fn still_shadow(&self, is_still: &[bool]) -> Result<Arc<ShadowMap>, CameraError> {
+        if self.objects.iter().zip(is_still).all(|(object, is_still)| object.is_fixed() == *is_still) {
+            return Ok(self.fixed_shadow.clone());
+        }
+        let mut kept = self.still_shadows.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(index) = kept.iter().position(|known| known.is_still == is_still) {
+            // The last ones are kept longest.
+            kept[index..].rotate_left(1);
+            return Ok(kept[kept.len() - 1].map.clone());
+        }
+        let mut casters = Vec::new();
+        for (index, object) in self.objects.iter().enumerate().filter(|(i, o)| is_still[*i] && o.casts_shadow)
+        {
+            let level = object.mesh.caster()?;
+            casters.push((self.still_mesh(index, level)?, object.mesh.level(level)?));
+        }
+        let map = Arc::new(draw_shadow(ShadowMap::new(&self.lighting), &casters));
+        if kept.len() == KEPT_SHADOWS {
+            kept.remove(0);
+        }
+        kept.push(StillShadow { is_still: is_still.to_vec(), map: map.clone() });
+        Ok(map)
     }
 
     /// The objects, in the order in which they were given.
@@ -139,17 +244,22 @@ impl RenderScene {
         &self.objects
     }
 
-    /// A level of detail of a fixed object in the world.
-    pub(crate) fn fixed_mesh(&self, object: usize, level: usize) -> Result<Arc<PosedMesh>, CameraError> {
-        self.fixed_meshes.get(&self.objects, object, level)
+    /// A level of detail of an object that stands still, in the world.
+    pub(crate) fn still_mesh(&self, object: usize, level: usize) -> Result<Arc<PosedMesh>, CameraError> {
+        self.still_meshes.get(&self.objects, object, level, &self.rest)
     }
 }
 
-/// Levels of detail of fixed objects in the world, by object and level, posed on first use.
-#[derive(Debug)]
-struct FixedMeshes(Vec<Vec<OnceLock<Arc<PosedMesh>>>>);
+fn draw_shadow(mut map: ShadowMap, casters: &[(Arc<PosedMesh>, &Lod)]) -> ShadowMap {
+    map.draw(casters.iter().map(|(posed, lod)| (posed.positions.as_slice(), lod.triangles.as_slice())));
+    map
+}
 
-impl FixedMeshes {
+/// Levels of detail of objects that stand still in the world, by object and level, posed on first use.
+#[derive(Debug)]
+struct StillMeshes(Vec<Vec<OnceLock<Arc<PosedMesh>>>>);
+
+impl StillMeshes {
     fn new(objects: &[RenderObject]) -> Self {
         let levels = |object: &RenderObject| vec![OnceLock::new(); object.mesh.level_count()];
         Self(objects.iter().map(levels).collect())
@@ -160,20 +270,21 @@ impl FixedMeshes {
         objects: &[RenderObject],
         index: usize,
         level: usize,
+        rest: &RestState,
     ) -> Result<Arc<PosedMesh>, CameraError> {
         let (slot, object) = (&self.0[index][level], &objects[index]);
         if let Some(posed) = slot.get() {
             return Ok(posed.clone());
         }
-        let posed = PosedMesh::new(object, object.mesh.level(level)?, &FrameView::default())?;
+        let posed = PosedMesh::new(object, object.mesh.level(level)?, &rest.view())?;
         Ok(slot.get_or_init(|| Arc::new(posed)).clone())
     }
 }
 
 /// Radius that contains all fixed objects, m, if the fine shadow map does not.
-fn wide_shadow_radius(fixed_meshes: &[Arc<PosedMesh>], lighting: &Lighting) -> Option<f32> {
+fn wide_shadow_radius(fixed: &[Arc<PosedMesh>], lighting: &Lighting) -> Option<f32> {
     let (centre, fine_radius) = (lighting.shadow_centre_w.cast::<f32>(), lighting.shadow_radius_m as f32);
-    let positions = fixed_meshes.iter().flat_map(|posed| &posed.positions);
+    let positions = fixed.iter().flat_map(|posed| &posed.positions);
     let farthest = positions.map(|p| (p - centre).norm()).fold(0.0, f32::max);
     (farthest > fine_radius).then(|| farthest.min(MAX_WIDE_RADIUS * fine_radius))
 }

@@ -212,6 +212,40 @@ fn a_small_image_is_a_large_one_scaled_down() {
 }
 
 #[test]
+fn objects_at_rest_look_as_moving_ones_do() {
+    let (objects, camera) = still_life();
+    let moving = scene(objects.clone());
+    let at = |x: f64| [Pose::translation(x - 0.05, -0.1, 0.05)];
+    let rest = RestState { rigid: at(0.0).to_vec(), ..RestState::default() };
+    let resting =
+        RenderScene::with_rest(objects, Lighting::default(), rest).expect("the default light is good");
+    let (mut of_moving, mut of_resting) = (Renderer::default(), Renderer::default());
+    let mut draw = |x: f64| {
+        let rigid = at(x);
+        let view = cube_view(&rigid);
+        let expected = of_moving.render(&moving, &view, &camera).expect("an image");
+        let image = of_resting.render(&resting, &view, &camera).expect("an image");
+        assert_eq!(image.segmentation, expected.segmentation, "{x}");
+        let mut depths = image.depth.iter().zip(&expected.depth);
+        assert!(depths.all(|(a, b)| a == b || (a - b).abs() < 2e-6), "{x}");
+        let expected: Vec<f64> = expected.rgb.iter().map(|&c| c.into()).collect();
+        let difference = difference(&expected, &image.rgb);
+        assert!(difference < 0.02, "{x}: {difference}");
+        // What was drawn before has no influence.
+        assert_eq!(Renderer::default().render(&resting, &view, &camera).expect("an image"), image, "{x}");
+        image
+    };
+    let [still, rounded, moved, back] = [0.0, 5e-7, 0.02, 0.0].map(&mut draw);
+    assert!(still == rounded && still == back && still.rgb != moved.rgb);
+    // Hidden objects leave no shadow, whether they rest or not.
+    let rigid = at(0.0);
+    let hidden = FrameView { hidden_id: 3, ..cube_view(&rigid) };
+    let [expected, image] = [(of_moving, &moving), (of_resting, &resting)]
+        .map(|(mut renderer, scene)| renderer.render(scene, &hidden, &camera).expect("an image"));
+    assert_eq!(image, expected);
+}
+
+#[test]
 fn images_are_byte_identical_on_every_thread() {
     let (objects, camera) = still_life();
     let scene = scene(objects);

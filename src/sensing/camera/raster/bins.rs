@@ -7,7 +7,7 @@ use super::{
 };
 use crate::camera::{
     lens::{Lens, ScreenVertex},
-    math::{LANES, V3},
+    math::{LANES, V3, higher, lower},
 };
 
 /// A front-facing triangle within the image.
@@ -76,19 +76,26 @@ impl TileBins {
     fn push(&mut self, lens: &Lens, [a, b, c]: ScreenCorners, id: u32) {
         // Triangles that are counter-clockwise from outside are clockwise in an image whose y axis points down.
         let area = (c[0] - a[0]) * (b[1] - a[1]) - (b[0] - a[0]) * (c[1] - a[1]);
-        let high = |axis: usize| a[axis].max(b[axis]).max(c[axis]);
-        let low = |axis: usize| a[axis].min(b[axis]).min(c[axis]);
-        let is_outside = high(0) < 0.0
-            || high(1) < 0.0
-            || low(0) > lens.width as f32
-            || low(1) > lens.height as f32
+        // False for NaN too.
+        let faces_camera = area > 0.0;
+        if !faces_camera {
+            return;
+        }
+        let high = |axis: usize| higher(higher(a[axis], b[axis]), c[axis]);
+        let low = |axis: usize| lower(lower(a[axis], b[axis]), c[axis]);
+        let [right, bottom] = [high(0), high(1)];
+        let [left, top] = [low(0), low(1)];
+        let is_outside = right < 0.0
+            || bottom < 0.0
+            || left > lens.width as f32
+            || top > lens.height as f32
             || high(2) < 1.0 / lens.far;
-        if area > 0.0 && !is_outside {
+        if !is_outside {
             // Conversions to integers saturate.
             let tile = |x: f32, axis: usize| {
                 ((x * (1.0 / TILE_EDGE as f32)) as u16).min(self.tile_counts[axis] as u16 - 1)
             };
-            let tiles = [0, 1].map(|axis| [tile(low(axis), axis), tile(high(axis), axis)]);
+            let tiles = [[tile(left, 0), tile(right, 0)], [tile(top, 1), tile(bottom, 1)]];
             self.triangles.push(ScreenTriangle { corners: [a, c, b], id, tiles });
         }
     }
@@ -124,6 +131,17 @@ impl TileBins {
     /// True if any triangle's bounding box overlaps a tile.
     pub(crate) fn is_occupied(&self, tile: usize) -> bool {
         self.starts[tile] < self.starts[tile + 1]
+    }
+
+    /// The rows of a tile at `top` that the bounding boxes of its triangles overlap.
+    pub(crate) fn rows(&self, tile: usize, top: f32) -> std::ops::Range<usize> {
+        let range = self.starts[tile] as usize..self.starts[tile + 1] as usize;
+        let (mut first, mut last) = (f32::MAX, f32::MIN);
+        for [_, y, _] in self.sorted[range].iter().flat_map(|&index| self.triangles[index as usize].corners) {
+            (first, last) = (lower(first, y), higher(last, y));
+        }
+        // Conversions to integers saturate.
+        ((first - top) as usize).min(TILE_EDGE)..((last - top) as usize).saturating_add(1).min(TILE_EDGE)
     }
 
     /// Draws the triangles of a tile with the corner `origin` in their order, without those hidden by one that covers
@@ -164,5 +182,32 @@ impl TileBins {
         }
         visible().for_each(|t| samples.draw(&t));
         None
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use softvt_geometry::Pose;
+    use softvt_scene::Camera;
+
+    #[test]
+    fn the_rows_of_a_triangle_stay_in_its_tile_however_far_it_reaches() {
+        let camera = Camera { pose: Pose::identity(), ..Camera::third_person_table() };
+        let lens = Lens::new(&camera, None).expect("a good camera");
+        let rows_of = |low: f32, high: f32| {
+            let mut bins = TileBins::default();
+            bins.clear(&lens);
+            // One metre ahead; y points up.
+            let [top, bottom] = [low, high].map(|row| (112.0 - row) / lens.focal);
+            let corners = [V3::new(-0.05, top, -1.0), V3::new(0.05, top, -1.0), V3::new(0.0, bottom, -1.0)];
+            bins.add(&lens, &corners, &[[0, 2, 1]], 0);
+            bins.sort();
+            // The fourth tile of the second row of tiles.
+            bins.rows(10, 32.0)
+        };
+        assert_eq!(rows_of(40.5, 50.5), 8..19);
+        assert_eq!(rows_of(40.5, 1e30), 8..32);
+        assert_eq!(rows_of(-1e30, 1e30), 0..32);
     }
 }

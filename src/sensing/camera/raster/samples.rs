@@ -4,7 +4,7 @@ use wide::{bytemuck::cast, u32x8};
 
 use super::{
     NO_TRIANGLE,
-    setup::{Coverage, DrawTarget, TriangleSetup},
+    setup::{Coverage, DrawTarget, EdgeFunction, TriangleSetup},
 };
 use crate::camera::math::{LANE_INDEX, LANES, f32x8};
 
@@ -44,7 +44,7 @@ pub(crate) struct TileSamples {
     colours: SamplePlane,
     /// The samples of depth and object at the centres, row by row; empty if they are not asked for.
     centres: SamplePlane,
-    /// First row drawn to, and the end of the last one.
+    /// First row drawn to or copied, and the end of the last one.
     drawn_rows: [usize; 2],
 }
 
@@ -59,9 +59,9 @@ impl SamplePlane {
         Self { w: vec![w; len], ids: vec![NO_TRIANGLE; len] }
     }
 
-    fn copy_from(&mut self, other: &Self) {
-        self.w.clone_from(&other.w);
-        self.ids.clone_from(&other.ids);
+    fn copy_from(&mut self, other: &Self, range: std::ops::Range<usize>) {
+        self.w[range.clone()].copy_from_slice(&other.w[range.clone()]);
+        self.ids[range.clone()].copy_from_slice(&other.ids[range]);
     }
 
     fn clear(&mut self, range: std::ops::Range<usize>, w: f32) {
@@ -69,46 +69,57 @@ impl SamplePlane {
         self.ids[range].fill(NO_TRIANGLE);
     }
 
-    /// Draws a triangle into eight samples from index `at` on, where it is nearer than what is there and `is_inside`.
+    /// Reciprocal depths and ids in a range of eights of samples.
     #[inline(always)]
-    fn draw(&mut self, at: usize, w: f32x8, id: u32, is_inside: impl FnOnce() -> f32x8) {
-        let old = self.w.get_mut(at..).and_then(|w| w.first_chunk_mut::<LANES>());
-        let ids = self.ids.get_mut(at..).and_then(|ids| ids.first_chunk_mut::<LANES>());
-        let (Some(old), Some(ids)) = (old, ids) else { return };
-        let is_visible = w.simd_gt(f32x8::new(*old)) & is_inside();
+    fn chunks(&mut self, range: std::ops::Range<usize>) -> impl Iterator<Item = SampleChunk<'_>> {
+        let w = self.w.get_mut(range.start * LANES..range.end * LANES).unwrap_or_default();
+        let ids = self.ids.get_mut(range.start * LANES..range.end * LANES).unwrap_or_default();
+        let chunks = w.as_chunks_mut().0.iter_mut().zip(ids.as_chunks_mut().0);
+        chunks.map(|(w, ids)| SampleChunk { w, ids })
+    }
+}
+
+/// Eight samples.
+struct SampleChunk<'a> {
+    w: &'a mut [f32; LANES],
+    ids: &'a mut [u32; LANES],
+}
+
+impl SampleChunk<'_> {
+    /// Draws triangle `id` where it is nearer than what is there and `is_inside`.
+    #[inline(always)]
+    fn draw(&mut self, w: f32x8, id: u32, is_inside: impl FnOnce() -> f32x8) {
+        let old = f32x8::new(*self.w);
+        let is_visible = w.simd_gt(old) & is_inside();
         if is_visible.any() {
-            *old = is_visible.select(w, f32x8::new(*old)).to_array();
+            *self.w = is_visible.select(w, old).to_array();
             let mask: u32x8 = cast(is_visible);
-            *ids = mask.select(u32x8::splat(id), u32x8::new(*ids)).to_array();
+            *self.ids = mask.select(u32x8::splat(id), u32x8::new(*self.ids)).to_array();
         }
     }
 }
 
-/// A linear function of eight samples of a chunk: its values for a chunk at the origin, and its slope.
+/// A linear function of the position of samples. Both triangles of an edge evaluate it alike, up to the sign.
 #[derive(Clone, Copy)]
-struct Linear {
-    values: f32x8,
-    dx: f32,
+struct ChunkPlane {
+    /// Change per column.
+    slope: f32x8,
+    /// Change from the start of a row to the samples in it.
+    in_row: f32x8,
     dy: f32,
     at_origin: f32,
 }
 
-impl Linear {
+impl ChunkPlane {
     #[inline(always)]
-    fn new(at_origin: f32, dx: f32, dy: f32, [x, y]: [f32x8; 2]) -> Self {
-        Self { values: f32x8::splat(dx) * x + f32x8::splat(dy) * y, dx, dy, at_origin }
+    fn new(at_origin: f32, dx: f32, dy: f32) -> Self {
+        Self { slope: f32x8::splat(dx), in_row: f32x8::splat(dy) * CHUNK_Y, dy, at_origin }
     }
 
-    /// The value at the start of a row.
+    /// The values at column 0 of the row that starts at `y`.
     #[inline(always)]
-    fn row(&self, y: f32) -> f32 {
-        self.at_origin + self.dy * y
-    }
-
-    /// The values of the chunk at column `x` of the row whose value at the start is `row`.
-    #[inline(always)]
-    fn at(&self, row: f32, x: f32) -> f32x8 {
-        self.values + f32x8::splat(row + self.dx * x)
+    fn row(&self, y: f32) -> f32x8 {
+        self.in_row + f32x8::splat(self.at_origin + self.dy * y)
     }
 }
 
@@ -147,13 +158,19 @@ impl TileSamples {
         self.drawn_rows = [TILE_EDGE, 0];
     }
 
-    /// Copies the samples of a background. Its centres are left out if they are not asked for here.
-    pub(crate) fn copy_from(&mut self, background: &Self) {
-        self.colours.copy_from(&background.colours);
+    /// Copies some rows of the samples of a background. Its centres are left out if they are not asked for here.
+    pub(crate) fn copy_rows(&mut self, background: &Self, rows: std::ops::Range<usize>) {
+        let [from, to] = [rows.start, rows.end].map(|row| row * TILE_EDGE);
+        self.colours.copy_from(&background.colours, SAMPLES_PER_PIXEL * from..SAMPLES_PER_PIXEL * to);
         if self.has_centres() {
-            self.centres.copy_from(&background.centres);
+            self.centres.copy_from(&background.centres, from..to);
         }
-        self.drawn_rows = [0, TILE_EDGE];
+        self.drawn_rows = [rows.start, rows.end];
+    }
+
+    /// The rows that were drawn to or copied.
+    pub(crate) fn rows(&self) -> std::ops::Range<usize> {
+        self.drawn_rows[0]..self.drawn_rows[1].max(self.drawn_rows[0])
     }
 
     /// Draws a triangle where no nearer one was drawn before.
@@ -168,32 +185,30 @@ impl TileSamples {
     #[inline(always)]
     fn draw_colours(&mut self, t: &TriangleSetup) {
         self.drawn_rows = [self.drawn_rows[0].min(t.rows[0]), self.drawn_rows[1].max(t.rows[1])];
-        let offsets = [CHUNK_X, CHUNK_Y];
-        let edges = t.edges.map(|e| Linear::new(e.c, e.a, e.b, offsets));
+        let edges = t.edges.map(|e| ChunkPlane::new(e.c, e.a, e.b));
         let thresholds = t.edges.map(|e| f32x8::splat(e.threshold));
-        let plane = Linear::new(t.w, t.dw_dx, t.dw_dy, offsets);
+        let plane = ChunkPlane::new(t.w, t.dw_dx, t.dw_dy);
         let (min_w, max_w) = (f32x8::splat(t.min_w), f32x8::splat(t.max_w));
         let chunks = t.columns[0] / PIXELS_PER_CHUNK..t.columns[1].div_ceil(PIXELS_PER_CHUNK);
-        let first_x = (chunks.start * PIXELS_PER_CHUNK) as f32;
+        let first_x = CHUNK_X + f32x8::splat((chunks.start * PIXELS_PER_CHUNK) as f32);
         let mut y = t.rows[0] as f32;
         for row in t.rows[0]..t.rows[1] {
-            let row_edges = edges.map(|edge| edge.row(y));
-            let row_w = plane.row(y);
-            y += 1.0;
+            let at = row * (TILE_EDGE / PIXELS_PER_CHUNK);
+            let (row_edges, row_w) = (edges.map(|edge| edge.row(y)), plane.row(y));
             let mut x = first_x;
-            for chunk in chunks.clone() {
+            for mut chunk in self.colours.chunks(at + chunks.start..at + chunks.end) {
                 // The plane of w, extrapolated to samples outside the triangle's edges, is clamped to the corners'
                 // range.
-                let w = plane.at(row_w, x).fast_max(min_w).fast_min(max_w);
-                let at = (row * TILE_EDGE + chunk * PIXELS_PER_CHUNK) * SAMPLES_PER_PIXEL;
-                let inside = |i: usize| edges[i].at(row_edges[i], x).simd_gt(thresholds[i]);
+                let w = (row_w + plane.slope * x).fast_max(min_w).fast_min(max_w);
+                let inside = |i: usize| (row_edges[i] + edges[i].slope * x).simd_gt(thresholds[i]);
                 if t.coverage == Coverage::Full {
-                    self.colours.draw(at, w, t.id, || f32x8::splat(f32::from_bits(u32::MAX)));
+                    chunk.draw(w, t.id, || f32x8::splat(f32::from_bits(u32::MAX)));
                 } else {
-                    self.colours.draw(at, w, t.id, || inside(0) & inside(1) & inside(2));
+                    chunk.draw(w, t.id, || inside(0) & inside(1) & inside(2));
                 }
-                x += PIXELS_PER_CHUNK as f32;
+                x += f32x8::splat(PIXELS_PER_CHUNK as f32);
             }
+            y += 1.0;
         }
     }
 
@@ -203,18 +218,21 @@ impl TileSamples {
             return;
         }
         self.drawn_rows = [self.drawn_rows[0].min(t.rows[0]), self.drawn_rows[1].max(t.rows[1])];
-        let offsets = [LANE_INDEX + f32x8::HALF, f32x8::HALF];
-        let edges = t.edges.map(|e| Linear::new(e.c, e.a, e.b, offsets));
-        let plane = Linear::new(t.w, t.dw_dx, t.dw_dy, offsets);
+        let chunks = t.columns[0] / LANES..t.columns[1].div_ceil(LANES);
         for row in t.rows[0]..t.rows[1] {
-            for column in (t.columns[0] / LANES * LANES..t.columns[1]).step_by(LANES) {
-                let (x, y) = (column as f32, row as f32);
-                let w = plane.at(plane.row(y), x).fast_max(f32x8::splat(t.min_w));
-                let inside =
-                    |i: usize| edges[i].at(edges[i].row(y), x).simd_gt(f32x8::splat(t.edges[i].threshold));
-                self.centres.draw(row * TILE_EDGE + column, w.fast_min(f32x8::splat(t.max_w)), t.id, || {
-                    inside(0) & inside(1) & inside(2)
+            let at = row * (TILE_EDGE / LANES);
+            let y = f32x8::splat(row as f32 + 0.5);
+            let mut x = LANE_INDEX + f32x8::splat((chunks.start * LANES) as f32 + 0.5);
+            for mut chunk in self.centres.chunks(at + chunks.start..at + chunks.end) {
+                let value =
+                    |c: f32, dx: f32, dy: f32| f32x8::splat(c) + f32x8::splat(dy) * y + f32x8::splat(dx) * x;
+                let w = value(t.w, t.dw_dx, t.dw_dy).fast_max(f32x8::splat(t.min_w));
+                let is_inside = |e: &EdgeFunction| value(e.c, e.a, e.b).simd_gt(f32x8::splat(e.threshold));
+                let [a, b, c] = &t.edges;
+                chunk.draw(w.fast_min(f32x8::splat(t.max_w)), t.id, || {
+                    is_inside(a) & is_inside(b) & is_inside(c)
                 });
+                x += f32x8::splat(LANES as f32);
             }
         }
     }

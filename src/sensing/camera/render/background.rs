@@ -1,4 +1,4 @@
-//! Cached images of the fixed objects for cameras that do not move. Only pixels that moving objects shadow
+//! Cached images of the objects that stand still for cameras that do not move. Only pixels that moving objects shadow
 //! or occlude are relit.
 
 use super::{
@@ -20,11 +20,13 @@ use softvt_scene::Camera;
 #[derive(Debug)]
 pub(crate) struct CachedBackground {
     pub(crate) camera: Camera,
+    /// The objects that it shows, by index.
+    pub(crate) shown: Vec<bool>,
     pub(crate) tiles: Vec<BackgroundTile>,
     pub(crate) image: RenderedImage,
 }
 
-/// The fixed objects in one tile.
+/// The objects that stand still in one tile.
 #[derive(Debug)]
 pub(crate) struct BackgroundTile {
     /// Mean display values without moving objects, 0..=255.
@@ -96,7 +98,7 @@ impl BackgroundTile {
             };
             let (p, n) = (self.p.load(first), self.n.load(first));
             let key = pass.scene.illumination.key_visibility(p, &n, pass.moving_shadow);
-            // No object has the index −1: the surfaces are fixed, the occluders are not.
+            // No object has the index −1: the surfaces stand still, the occluders do not.
             let sky = sky_visibility(occluders, p, n, f32x8::splat(-1.0));
             if (key.simd_lt(f32x8::ONE) | sky.simd_lt(f32x8::ONE)).any() {
                 let (direct, ambient) = (self.direct.load(first), self.ambient.load(first));

@@ -13,7 +13,6 @@ use crate::camera::{
         shading::SurfaceSamples,
     },
 };
-use softvt_geometry::Vec3;
 
 /// A mesh at one level of detail, posed in the world.
 #[derive(Clone, Debug)]
@@ -46,7 +45,7 @@ pub(crate) struct TriangleInterpolator<'a> {
     /// Products of a ray with these vectors are proportional to its barycentric coordinates: they are the volumes
     /// that the ray spans with the opposite edges. This also holds for triangles that reach behind the camera (Olano
     /// & Greer, Triangle Scan Conversion using 2D Homogeneous Coordinates, 1997).
-    barycentric: [Vec3; 3],
+    barycentric: [V3; 3],
     corners: [[f32; ATTRIBUTES]; 3],
     chart: Option<&'a TextureChart>,
 }
@@ -62,10 +61,9 @@ impl<'a> TriangleInterpolator<'a> {
             let [u, v] = lod.uvs.get(triangle).map_or([0.0; 2], |uvs| uvs[corner]);
             [p.x, p.y, p.z, n.x, n.y, n.z, r, g, b, roughness, metalness, sky, u, v, 0.0, 0.0]
         });
-        let [a, b, c] = corners.map(|corner| V3::new(corner[0], corner[1], corner[2]).cast::<f64>());
         Self {
             id,
-            barycentric: [b.cross(&c), c.cross(&a), a.cross(&b)],
+            barycentric: barycentric(&corners),
             corners,
             chart: lod
                 .chart_ids
@@ -109,10 +107,10 @@ impl<'a> TriangleInterpolator<'a> {
     /// Barycentric coordinates at eight neighbouring pixels; [x, y] is the centre of the first.
     #[inline(always)]
     fn row_weights(&self, lens: &Lens, [x, y]: [f32; 2]) -> [f32x8; 3] {
-        let (first, right) = (lens.ray(x, y), lens.right.cast());
+        let first = lens.ray(x, y);
         let weights = self
             .barycentric
-            .map(|b| f32x8::splat(b.dot(&first) as f32) + f32x8::splat(b.dot(&right) as f32) * LANE_INDEX);
+            .map(|b| f32x8::splat(b.dot(&first)) + f32x8::splat(b.dot(&lens.right)) * LANE_INDEX);
         let scale = f32x8::ONE / (weights[0] + weights[1] + weights[2]);
         weights.map(|weight| weight * scale)
     }
@@ -124,42 +122,78 @@ impl<'a> TriangleInterpolator<'a> {
         a * w[0] + b * w[1] + c * w[2]
     }
 
-    /// Barycentric coordinates of the point of the triangle that appears nearest to (x, y).
-    fn nearest_weights(&self, lens: &Lens, x: f32, y: f32) -> [f32; 3] {
-        let ray = lens.ray(x, y);
-        let mut weights = self.barycentric.map(|b| b.dot(&ray));
-        let sign = (weights[0] + weights[1] + weights[2]).signum();
-        if weights.iter().any(|w| w * sign < 0.0) {
-            // In the image, a weight is linear: it vanishes on an edge, and its gradient is normal to that edge.
-            let axes: [Vec3; 2] = [lens.right.cast(), lens.down.cast()];
-            let gradients = self.barycentric.map(|b| axes.map(|axis| b.dot(&axis)));
-            // A square root rounds alike on every machine; `hypot` does not.
-            let length = |[x, y]: [f64; 2]| (x * x + y * y).sqrt();
-            let distance = |i: usize| -weights[i] * sign / length(gradients[i]).max(f64::MIN_POSITIVE);
-            let edge = (1..3).fold(0, |most, i| if distance(i) > distance(most) { i } else { most });
-            let [gx, gy] = gradients[edge];
-            let step = weights[edge] / (gx * gx + gy * gy).max(f64::MIN_POSITIVE);
-            let on_edge = ray - (axes[0] * gx + axes[1] * gy) * step;
-            weights = self.barycentric.map(|b| b.dot(&on_edge));
-            weights[edge] = 0.0;
-        }
-        let sum = weights[0] + weights[1] + weights[2];
-        let w = if sum == 0.0 { [1.0 / 3.0; 3] } else { weights.map(|w| (w / sum).max(0.0) as f32) };
-        let scale = 1.0 / (w[0] + w[1] + w[2]);
-        w.map(|w| w * scale)
-    }
-
     /// Appends the point where the ray through (x, y) meets the triangle, or the point of the triangle that appears
     /// nearest.
-    pub(crate) fn push(&self, batch: &mut ShadingBatch<'a>, lens: &Lens, x: f32, y: f32) {
-        let w = self.nearest_weights(lens, x, y);
-        let ([a, b, c], lane) = (&self.corners, batch.count);
-        let half = |of: &[f32; ATTRIBUTES], i: usize| f32x8::new(of.as_chunks::<LANES>().0[i]);
-        let w = w.map(f32x8::splat);
-        batch.attributes[lane] = [0, 1].map(|i| half(a, i) * w[0] + half(b, i) * w[1] + half(c, i) * w[2]);
+    pub(crate) fn push(&self, batch: &mut ShadingBatch<'a>, x: f32, y: f32) {
+        let lane = batch.count;
+        (batch.x[lane], batch.y[lane]) = (x, y);
+        for (of_batch, own) in batch.barycentric.iter_mut().zip(&self.barycentric) {
+            of_batch.iter_mut().zip(own.iter()).for_each(|(lanes, component)| lanes[lane] = *component);
+        }
+        batch.corners[lane] = self.corners;
         batch.object[lane] = object_index(self.id) as f32;
         batch.charts[lane] = self.chart;
     }
+}
+
+/// Barycentric coordinates of the points of eight triangles that appear nearest to (x, y), given the vectors of
+/// [`TriangleInterpolator::barycentric`].
+fn nearest_weights(barycentric: &[Vec3x8; 3], lens: &Lens, x: f32x8, y: f32x8) -> [f32x8; 3] {
+    let axes = [&lens.right, &lens.down].map(Vec3x8::splat);
+    let rays = lens.rays(x, y);
+    let weights = barycentric.map(|b| b.dot(rays));
+    let is_negative = (weights[0] + weights[1] + weights[2]).simd_lt(f32x8::ZERO);
+    let mut weights = weights.map(|w| is_negative.select(-w, w));
+    let is_beyond = |w: f32x8| w.simd_lt(f32x8::ZERO);
+    let is_outside = is_beyond(weights[0]) | is_beyond(weights[1]) | is_beyond(weights[2]);
+    if is_outside.any() {
+        // In the image, a weight is linear: it vanishes on an edge, and its gradient is normal to that edge.
+        let gradients = barycentric.map(|b| {
+            let [u, v] = axes.map(|axis| b.dot(axis));
+            let [u, v] = [u, v].map(|g| is_negative.select(-g, g));
+            EdgeGradient { u, v, squared: (u * u + v * v).fast_max(f32x8::splat(f32::MIN_POSITIVE)) }
+        });
+        let distance = |i: usize| -weights[i] / gradients[i].squared.sqrt();
+        let (mut farthest, mut edge) = (distance(0), f32x8::ZERO);
+        let (mut gradient, mut weight) = (gradients[0], weights[0]);
+        for i in 1..3 {
+            let is_farther = distance(i).simd_gt(farthest);
+            farthest = is_farther.select(distance(i), farthest);
+            edge = is_farther.select(f32x8::splat(i as f32), edge);
+            gradient = EdgeGradient {
+                u: is_farther.select(gradients[i].u, gradient.u),
+                v: is_farther.select(gradients[i].v, gradient.v),
+                squared: is_farther.select(gradients[i].squared, gradient.squared),
+            };
+            weight = is_farther.select(weights[i], weight);
+        }
+        let step = weight / gradient.squared;
+        for (i, of_edge) in gradients.iter().enumerate() {
+            let on_edge = weights[i] - step * (of_edge.u * gradient.u + of_edge.v * gradient.v);
+            let on_edge = edge.simd_eq(f32x8::splat(i as f32)).select(f32x8::ZERO, on_edge);
+            weights[i] = is_outside.select(on_edge, weights[i]).fast_max(f32x8::ZERO);
+        }
+    }
+    let sum = weights[0] + weights[1] + weights[2];
+    let is_flat = !sum.simd_gt(f32x8::ZERO);
+    let scale = f32x8::ONE / sum;
+    weights.map(|w| is_flat.select(f32x8::splat(1.0 / 3.0), w * scale))
+}
+
+/// The gradient of a barycentric coordinate in the image, per pixel.
+#[derive(Clone, Copy)]
+struct EdgeGradient {
+    u: f32x8,
+    v: f32x8,
+    /// The square of its length.
+    squared: f32x8,
+}
+
+/// The vectors whose products with a ray are proportional to its barycentric coordinates in the triangle.
+fn barycentric(corners: &[[f32; ATTRIBUTES]; 3]) -> [V3; 3] {
+    let [a, b, c] = corners.map(|corner| V3::new(corner[0], corner[1], corner[2]));
+    // One factor is an edge: products of two corners would lose the digits of a small triangle.
+    [b.cross(&(c - b)), c.cross(&(a - c)), a.cross(&(b - a))]
 }
 
 fn vec3_attribute(attribute: impl Fn(usize) -> f32x8, first: usize) -> Vec3x8 {
@@ -198,8 +232,12 @@ pub(crate) struct ShadingBatch<'a> {
     pub(crate) pixel: [u32; LANES],
     /// Fraction of the pixel that each point accounts for.
     pub(crate) share: [f32; LANES],
-    /// The two halves of the attributes of each point.
-    attributes: [[f32x8; 2]; LANES],
+    /// Position of each point in the image, pixels.
+    x: [f32; LANES],
+    y: [f32; LANES],
+    /// Of the triangle of each point, as in [`TriangleInterpolator`].
+    barycentric: [[[f32; LANES]; 3]; 3],
+    corners: [[[f32; ATTRIBUTES]; 3]; LANES],
     object: [f32; LANES],
     charts: [Option<&'a TextureChart>; LANES],
 }
@@ -207,7 +245,15 @@ pub(crate) struct ShadingBatch<'a> {
 impl ShadingBatch<'_> {
     /// Returns the points; lanes from `count` on hold leftovers.
     pub(crate) fn samples(&self, lens: &Lens) -> SurfaceSamples {
-        let halves = [0, 1].map(|half| f32x8::transpose(self.attributes.map(|point| point[half])));
+        let barycentric = self.barycentric.each_ref().map(Vec3x8::from_arrays);
+        let weights = nearest_weights(&barycentric, lens, f32x8::new(self.x), f32x8::new(self.y));
+        let weights = weights.map(f32x8::to_array);
+        let half = |half: usize, lane: usize| {
+            let [a, b, c] = self.corners[lane].map(|corner| f32x8::new(corner.as_chunks().0[half]));
+            let [wa, wb, wc] = weights.map(|w| f32x8::splat(w[lane]));
+            a * wa + b * wb + c * wc
+        };
+        let halves = [0, 1].map(|i| f32x8::transpose(std::array::from_fn(|lane| half(i, lane))));
         let attribute = |i: usize| halves[i / LANES][i % LANES];
         let mut samples = surface_samples(attribute, f32x8::new(self.object), lens);
         let chart_of = |lane: usize| self.charts[lane].map_or(std::ptr::null(), |c| c as *const TextureChart);
@@ -245,14 +291,18 @@ mod tests {
     fn triangle(corners: [[f32; 2]; 3]) -> TriangleInterpolator<'static> {
         let lens = lens();
         let corners = corners.map(|[x, y]| {
-            let ray: V3 = lens.ray(x, y).cast();
+            let ray = lens.ray(x, y);
             let mut corner = [0.0; ATTRIBUTES];
             corner[..3].copy_from_slice(ray.as_slice());
             corner
         });
-        let [a, b, c] = corners.map(|corner| V3::new(corner[0], corner[1], corner[2]).cast::<f64>());
-        let barycentric = [b.cross(&c), c.cross(&a), a.cross(&b)];
-        TriangleInterpolator { id: 0, barycentric, corners, chart: None }
+        TriangleInterpolator { id: 0, barycentric: barycentric(&corners), corners, chart: None }
+    }
+
+    /// Barycentric coordinates of the point of a triangle that appears nearest to (x, y).
+    fn nearest(triangle: &TriangleInterpolator, x: f32, y: f32) -> [f32; 3] {
+        let barycentric = triangle.barycentric.each_ref().map(Vec3x8::splat);
+        nearest_weights(&barycentric, &lens(), f32x8::splat(x), f32x8::splat(y)).map(|w| w.to_array()[0])
     }
 
     #[test]
@@ -261,7 +311,7 @@ mod tests {
         let corners = [[60.0, 100.0], [160.0, 100.0], [150.0, 100.2]];
         let sliver = triangle(corners);
         for (x, y) in [(100.0, 99.0), (100.0, 101.0), (130.0, 98.0), (80.0, 103.0)] {
-            let weights = sliver.nearest_weights(&lens(), x, y);
+            let weights = nearest(&sliver, x, y);
             let at = |axis: usize| (0..3).map(|i| weights[i] * corners[i][axis]).sum::<f32>();
             assert!((at(0) - x).abs() < 0.1, "({x}, {y}): the point shown is at {}", at(0));
             assert!((99.9..=100.3).contains(&at(1)), "({x}, {y}): the point shown is at {}", at(1));
@@ -272,7 +322,7 @@ mod tests {
     #[test]
     fn a_pixel_inside_a_triangle_shows_the_point_that_its_ray_meets() {
         let corners = [[40.0, 40.0], [160.0, 60.0], [90.0, 180.0]];
-        let weights = triangle(corners).nearest_weights(&lens(), 97.0, 93.0);
+        let weights = nearest(&triangle(corners), 97.0, 93.0);
         let at = [0, 1].map(|axis| (0..3).map(|i| weights[i] * corners[i][axis]).sum::<f32>());
         assert!((at[0] - 97.0).abs() < 1e-3 && (at[1] - 93.0).abs() < 1e-3, "{at:?}");
     }

@@ -25,10 +25,10 @@ use softvt_scene::{Camera, CameraMount};
 /// Draws images of a [`RenderScene`] as cameras see it.
 ///
 /// A renderer keeps working memory between images. It also caches the moving objects of the last state with their
-/// shadows, which all cameras share, and the background (all fixed objects) of every camera fixed in the world. Neither
-/// changes depth or segmentation; with a cached background, colours of relit pixels differ from a full rendering by
-/// rounding, and by the interpolation of light between rows.
-/// A renderer may be used with several scenes, but keeps the cache of one.
+/// shadows, which all cameras share, and the background of every camera fixed in the world: all objects that stand
+/// still, fixed or [at rest](super::RestState). Neither changes segmentation, nor depth by more than 2 µm; with a
+/// cached background, colours of relit pixels differ from a full rendering by rounding, and by the interpolation of
+/// light between rows. A renderer may be used with several scenes, but keeps the cache of one.
 #[derive(Debug, Default)]
 pub struct Renderer {
     /// True if no background is kept.
@@ -108,24 +108,28 @@ impl Renderer {
         }
         let moving = self.moving.get_or_insert_with(|| MovingObjects::new(scene));
         moving.adopt(view);
-        let posed = |index| PosedObject::new(scene, index, view, &lens, moving);
+        let is_still = scene.still_objects(view);
+        let still_shadow = match channels.has_colours() {
+            true => scene.still_shadow(&is_still)?,
+            false => scene.fixed_shadow.clone(),
+        };
+        let posed = |index: usize| PosedObject::new(scene, index, is_still[index], view, &lens, moving);
         let objects = (0..scene.objects.len()).map(posed).collect::<Result<Vec<_>, _>>()?;
         if channels.has_colours() {
             moving.draw_shadow(view.hidden_id, &objects);
         }
         let occluders = |is_moving: bool| -> Vec<OcclusionEllipsoid> {
-            let occluders = objects
-                .iter()
-                .enumerate()
-                .filter(|(_, o)| o.is_occluder() && o.object.is_moving() == is_moving);
+            let occluders =
+                objects.iter().enumerate().filter(|(_, o)| o.is_occluder() && o.is_moving == is_moving);
             occluders.map(|(i, o)| OcclusionEllipsoid::from_bounds(i, &o.bounds)).collect()
         };
         let pass = RenderPass {
             scene,
             lens: &lens,
             objects: &objects,
-            fixed_occluders: &occluders(false),
+            still_occluders: &occluders(false),
             moving_occluders: &occluders(true),
+            still_shadow: &still_shadow,
             moving_shadow: moving.shadow(),
             channels,
         };
@@ -134,10 +138,12 @@ impl Renderer {
         } else if self.is_transient {
             draw_by_tiles(&pass, &mut self.bins)
         } else {
+            let shown: Vec<bool> = objects.iter().map(|o| !o.is_moving && !o.is_hidden).collect();
+            self.backgrounds.retain(|known| known.camera != *camera || known.shown == shown);
             let known = self.backgrounds.iter().position(|background| background.camera == *camera);
             let index = known.unwrap_or_else(|| {
                 let pass = RenderPass { channels: Channels::All, ..pass };
-                self.backgrounds.push(draw_background(&pass, camera, &mut self.bins));
+                self.backgrounds.push(draw_background(&pass, camera, shown, &mut self.bins));
                 self.backgrounds.len() - 1
             });
             draw_over_background(&pass, &self.backgrounds[index], &mut self.bins)
@@ -188,8 +194,13 @@ fn draw_all(pass: &RenderPass, bins: &mut TileBins) -> RenderedImage {
     image
 }
 
-/// Draws the fixed objects.
-fn draw_background(pass: &RenderPass, camera: &Camera, bins: &mut TileBins) -> CachedBackground {
+/// Draws the objects that stand still.
+fn draw_background(
+    pass: &RenderPass,
+    camera: &Camera,
+    shown: Vec<bool>,
+    bins: &mut TileBins,
+) -> CachedBackground {
     pass.bin(&[false], bins);
     let (mut image, mut tiles) = (blank_image(pass), Vec::new());
     for (tile, rect) in TileRect::all(pass.lens).enumerate() {
@@ -197,7 +208,7 @@ fn draw_background(pass: &RenderPass, camera: &Camera, bins: &mut TileBins) -> C
         rect.write(&background.display, &mut image);
         tiles.push(background);
     }
-    CachedBackground { camera: camera.clone(), tiles, image }
+    CachedBackground { camera: camera.clone(), shown, tiles, image }
 }
 
 fn draw_background_tile(
@@ -228,22 +239,23 @@ fn draw_over_background(
         image.depth.clone_from(&background.image.depth);
         image.segmentation.clone_from(&background.image.segmentation);
     }
-    for (tile, (rect, fixed)) in TileRect::all(pass.lens).zip(&background.tiles).enumerate() {
-        working.draw_over(pass, tile, rect, fixed, bins, &mut image);
+    for (tile, (rect, still)) in TileRect::all(pass.lens).zip(&background.tiles).enumerate() {
+        working.draw_over(pass, tile, rect, still, bins, &mut image);
     }
     image
 }
 
-/// Draws the fixed objects, and the moving ones over them, tile by tile: the background of one tile is kept at a time.
-fn draw_by_tiles(pass: &RenderPass, fixed_bins: &mut TileBins) -> RenderedImage {
+/// Draws the objects that stand still, and the moving ones over them, tile by tile: the background of one tile is kept
+/// at a time.
+fn draw_by_tiles(pass: &RenderPass, still_bins: &mut TileBins) -> RenderedImage {
     let mut moving_bins = TileBins::default();
-    pass.bin(&[false], fixed_bins);
+    pass.bin(&[false], still_bins);
     pass.bin(&[true], &mut moving_bins);
     let (mut image, mut working) = (blank_image(pass), TileWorkspace::new(pass));
     for (tile, rect) in TileRect::all(pass.lens).enumerate() {
-        let fixed = draw_background_tile(pass, tile, rect, fixed_bins, &mut image);
-        rect.write(&fixed.display, &mut image);
-        working.draw_over(pass, tile, rect, &fixed, &moving_bins, &mut image);
+        let still = draw_background_tile(pass, tile, rect, still_bins, &mut image);
+        rect.write(&still.display, &mut image);
+        working.draw_over(pass, tile, rect, &still, &moving_bins, &mut image);
     }
     image
 }
@@ -266,19 +278,19 @@ impl TileWorkspace {
         pass: &RenderPass,
         tile: usize,
         rect: TileRect,
-        fixed: &BackgroundTile,
+        still: &BackgroundTile,
         bins: &TileBins,
         image: &mut RenderedImage,
     ) {
         let Self { samples, blocks, display } = self;
-        let occluders = fixed.moving_occluders(pass);
+        let occluders = still.moving_occluders(pass);
         if bins.is_occupied(tile) {
-            samples.copy_from(&fixed.samples);
+            samples.copy_rows(&still.samples, bins.rows(tile, rect.origin()[1]));
             bins.draw_tile(tile, rect.origin(), samples, blocks, false);
-            fixed.relight(pass, occluders.as_deref(), |first| is_all_moving(samples, first), display);
+            still.relight(pass, occluders.as_deref(), |first| is_all_moving(samples, first), display);
             TileResolver::new(pass, rect, samples, display, image).run(true);
         } else if occluders.is_some() {
-            fixed.relight(pass, occluders.as_deref(), |_| false, display);
+            still.relight(pass, occluders.as_deref(), |_| false, display);
         } else {
             return;
         }

@@ -78,8 +78,7 @@ impl MovingObjects {
             return;
         }
         self.shadow_hidden_id = Some(hidden_id);
-        let casters =
-            objects.iter().filter(|o| o.object.casts_shadow && o.object.is_moving() && !o.is_hidden);
+        let casters = objects.iter().filter(|o| o.object.casts_shadow && o.is_moving && !o.is_hidden);
         self.shadow
             .draw(casters.map(|o| (o.caster.posed.positions.as_slice(), o.caster.lod.triangles.as_slice())));
     }

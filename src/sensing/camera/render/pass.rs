@@ -46,6 +46,8 @@ pub(crate) struct PosedObject<'a> {
     pub(crate) drawn: Option<MeshInstance<'a>>,
     /// True if the object is left out of the image.
     pub(crate) is_hidden: bool,
+    /// False if it is fixed or at rest.
+    pub(crate) is_moving: bool,
 }
 
 impl<'a> PosedObject<'a> {
@@ -53,18 +55,19 @@ impl<'a> PosedObject<'a> {
     pub(crate) fn new(
         scene: &'a RenderScene,
         index: usize,
+        is_still: bool,
         view: &FrameView,
         lens: &Lens,
         moving: &mut MovingObjects,
     ) -> Result<Self, CameraError> {
-        let object = &scene.objects[index];
+        let (object, is_moving) = (&scene.objects[index], !is_still);
         let mesh = &object.mesh;
         let mut pose = |level: usize| {
             let lod = mesh.level(level)?;
-            let posed = if object.is_moving() {
+            let posed = if is_moving {
                 moving.mesh(index, object, level, lod, view)?
             } else {
-                scene.fixed_mesh(index, level)?
+                scene.still_mesh(index, level)?
             };
             Ok(MeshInstance { lod, posed })
         };
@@ -84,7 +87,7 @@ impl<'a> PosedObject<'a> {
         } else {
             None
         };
-        Ok(Self { object, caster, bounds, drawn, is_hidden })
+        Ok(Self { object, caster, bounds, drawn, is_hidden, is_moving })
     }
 
     /// True for small objects that cast shadows, except links of articulations.
@@ -118,8 +121,9 @@ pub(crate) struct RenderPass<'a> {
     pub(crate) scene: &'a RenderScene,
     pub(crate) lens: &'a Lens,
     pub(crate) objects: &'a [PosedObject<'a>],
-    pub(crate) fixed_occluders: &'a [OcclusionEllipsoid],
+    pub(crate) still_occluders: &'a [OcclusionEllipsoid],
     pub(crate) moving_occluders: &'a [OcclusionEllipsoid],
+    pub(crate) still_shadow: &'a ShadowMap,
     pub(crate) moving_shadow: &'a ShadowMap,
     pub(crate) channels: Channels,
 }
@@ -163,21 +167,21 @@ impl RenderPass<'_> {
         Some([object_index(id), mesh.lod.smoothing_groups[triangle_index(id)] as usize])
     }
 
-    /// Radiance of points that only fixed objects shadow and occlude.
+    /// Radiance of points that only still objects shadow and occlude.
     #[inline(always)]
     pub(crate) fn shade(&self, points: &SurfaceSamples) -> DirectAndAmbient {
         self.light(points).radiance(points.diffuse_albedo())
     }
 
-    /// Light reflected by points that only fixed objects shadow and occlude.
+    /// Light reflected by points that only still objects shadow and occlude.
     #[inline(always)]
     pub(crate) fn light(&self, points: &SurfaceSamples) -> LightBySource {
         let to_eye = (Vec3x8::splat(&self.lens.eye) - points.p).normalized();
         let illumination = &self.scene.illumination;
         let LightBySource { direct, ambient } = illumination.reflect(points, to_eye);
-        let (fine, wide) = (&self.scene.fixed_shadow, self.scene.wide_shadow.as_ref());
+        let (fine, wide) = (self.still_shadow, self.scene.wide_shadow.as_ref());
         let key = illumination.key_visibility_cascaded(points.p, &points.n, fine, wide);
-        let sky = sky_visibility(self.fixed_occluders, points.p, points.n, points.object);
+        let sky = sky_visibility(self.still_occluders, points.p, points.n, points.object);
         LightBySource { direct: direct * key, ambient: ambient * sky }
     }
 
@@ -190,12 +194,12 @@ impl RenderPass<'_> {
         }
     }
 
-    /// Sorts the triangles of moving objects, fixed ones, or one kind after the other into tiles.
+    /// Sorts the triangles of moving objects, still ones, or one kind after the other into tiles.
     pub(crate) fn bin(&self, kinds: &[bool], bins: &mut TileBins) {
         bins.clear(self.lens);
         for &is_moving in kinds {
             for (i, posed) in self.objects.iter().enumerate() {
-                if let Some(mesh) = posed.drawn.as_ref().filter(|_| posed.object.is_moving() == is_moving) {
+                if let Some(mesh) = posed.drawn.as_ref().filter(|_| posed.is_moving == is_moving) {
                     let first_id = first_triangle_id(i, is_moving);
                     bins.add(self.lens, &mesh.posed.positions, &mesh.lod.triangles, first_id);
                 }

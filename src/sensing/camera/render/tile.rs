@@ -120,7 +120,7 @@ pub(crate) trait ShadingSink {
     /// Clears a pixel before its shares are added.
     fn begin_pixel(&mut self, _pixel: usize) {}
 
-    /// Adds radiance under fixed objects alone to pixels; `surface` are the points that it comes from, `None` for the
+    /// Adds radiance under still objects alone to pixels; `surface` are the points that it comes from, `None` for the
     /// background.
     fn add(
         &mut self,
@@ -347,12 +347,14 @@ impl<'a, 'p, S: ShadingSink> TileResolver<'a, 'p, S> {
         Self { pass, rect, samples, sink, image, recent: [None; RECENT], batch: ShadingBatch::default() }
     }
 
-    /// Resolves all pixels, or only those that show a moving object. Depth and segmentation go to `image` directly.
+    /// Resolves all pixels, or only those that show a moving object; of the others, the samples need not be set. Depth
+    /// and segmentation go to `image` directly.
     pub(crate) fn run(&mut self, only_moving: bool) {
+        let rows = if only_moving { self.samples.rows() } else { 0..TILE_EDGE };
         for x in (0..self.rect.width).step_by(LANES) {
             let all = (1 << (self.rect.width - x).min(LANES)) - 1;
             let mut covered = CoveredRows { id: NO_TRIANGLE, from: 0, to: 0 };
-            for y in 0..self.rect.height {
+            for y in rows.start..rows.end.min(self.rect.height) {
                 let samples = self.samples.colour_ids(x, y);
                 let colours = if only_moving { moving_pixels(&samples) & all } else { all };
                 let mut centres = all;
@@ -480,7 +482,7 @@ impl<'a, 'p, S: ShadingSink> TileResolver<'a, 'p, S> {
         }
         if let Some(triangle) = interpolator(&mut self.recent, self.pass, id) {
             let batch = &mut self.batch;
-            triangle.push(batch, self.pass.lens, x, y);
+            triangle.push(batch, x, y);
             (batch.pixel[batch.count], batch.share[batch.count]) = (pixel as u32, share);
             batch.count += 1;
         }
@@ -530,8 +532,9 @@ fn is_uniform(samples: &[u32; SAMPLES_PER_PIXEL * LANES]) -> bool {
 
 /// True if eight pixels from `first` on show moving objects only.
 pub(crate) fn is_all_moving(samples: &TileSamples, first: usize) -> bool {
-    let samples = samples.colour_ids(first % TILE_EDGE, first / TILE_EDGE);
-    samples.as_chunks::<LANES>().0.iter().all(|ids| moving_bits(ids) == 0xFF)
+    let (x, y) = (first % TILE_EDGE, first / TILE_EDGE);
+    let ids = samples.colour_ids(x, y);
+    samples.rows().contains(&y) && ids.as_chunks::<LANES>().0.iter().all(|ids| moving_bits(ids) == 0xFF)
 }
 
 /// Number of prepared triangles that a tile keeps: neighbouring pixels alternate between a few.
