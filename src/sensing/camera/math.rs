@@ -27,6 +27,18 @@ pub(crate) fn higher(a: f32, b: f32) -> f32 {
     if b > a { b } else { a }
 }
 
+/// Lowest and highest corner of a bounding box.
+pub(crate) type Bounds = [V3; 2];
+
+/// Bounds of points; inverted without any.
+pub(crate) fn bounds_of(points: impl IntoIterator<Item = V3>) -> Bounds {
+    let [mut low, mut high] = [f32::MAX, f32::MIN].map(V3::repeat);
+    for p in points {
+        (low, high) = (low.zip_map(&p, lower), high.zip_map(&p, higher));
+    }
+    [low, high]
+}
+
 /// Number of points shaded at once.
 pub(crate) const LANES: usize = 8;
 

@@ -9,7 +9,7 @@ use nalgebra::Matrix3;
 
 use super::{
     error::CameraError,
-    math::{V3, is_finite},
+    math::{Bounds, V3, bounds_of, is_finite},
     mesh::{
         lod::{Lod, NodeWeights, RelativeNormal, vertex_normals},
         render_mesh::RenderMesh,
@@ -331,6 +331,8 @@ pub(crate) struct PosedMesh {
     pub(crate) normals: Vec<V3>,
     /// Albedo in place of that of the materials; empty for the materials.
     pub(crate) albedo: Vec<V3>,
+    /// Bounds of the vertices.
+    pub(crate) bounds: Bounds,
 }
 
 impl PosedMesh {
@@ -363,8 +365,10 @@ impl PosedMesh {
         }
         let rotation: Matrix3<f32> = pose_w.rotation.to_rotation_matrix().matrix().cast();
         let translation: V3 = pose_w.translation.vector.cast();
+        let positions: Vec<V3> = lod.positions.iter().map(|p| rotation * p + translation).collect();
         Ok(Self {
-            positions: lod.positions.iter().map(|p| rotation * p + translation).collect(),
+            bounds: bounds_of(positions.iter().copied()),
+            positions,
             normals: lod.normals.iter().map(|n| rotation * n).collect(),
             albedo: Vec::new(),
         })
@@ -403,6 +407,6 @@ impl PosedMesh {
             true => lod.embedding.iter().map(colour).collect(),
             false => Vec::new(),
         };
-        Ok(Self { positions, normals, albedo })
+        Ok(Self { bounds: bounds_of(positions.iter().copied()), positions, normals, albedo })
     }
 }

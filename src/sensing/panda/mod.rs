@@ -118,6 +118,7 @@ impl RobotMeshes {
         for (side, name) in Side::BOTH.into_iter().zip(["left gel", "right gel"]) {
             let (link, visual) = (Some(panda::finger_link(side)), &visuals[SENSOR_GEL..]);
             let mesh = RenderMesh::from_mesh(name, &hand::gel(side), visual, &DiskCache::DISABLED)?;
+            let mesh = mesh.with_coarser_levels()?;
             meshes.push(PartMesh { link, name: name.to_owned(), mesh: Arc::new(mesh) });
         }
         Ok(Self { parts: meshes })

@@ -265,14 +265,29 @@ impl RenderMesh {
         }
         let max_cell = solids.iter().map(|solid| solid.cell_m).fold(MIN_CELL, f64::max);
         let spacing = (UNIFORM_SPACING * max_cell) as f32;
-        let mut finer = bake_vertices(&combined, &material_ids, visuals, spacing, Some(&union));
+        let mut full = bake_vertices(&combined, &material_ids, visuals, spacing, Some(&union));
         // Solids share no vertices and are uniform each, so their materials do not limit simplification.
-        finer.is_uniform = true;
-        Ok(Self::from_levels(LOD_ERRORS.map(|geometric_error| {
-            finer = Lod { geometric_error, ..simplify(&finer, geometric_error, f32::MAX) };
-            finer.clone()
-        })))
+        full.is_uniform = true;
+        Ok(Self::from_levels(simplified_levels(&full)))
     }
+
+    /// The mesh with coarser levels of detail, for a mesh of one level that is uniform and not textured.
+    ///
+    /// # Errors
+    /// The mesh cannot be built.
+    pub(crate) fn with_coarser_levels(&self) -> Result<Self, CameraError> {
+        let full = self.level(0)?;
+        Ok(Self::from_levels(std::iter::once(full.clone()).chain(simplified_levels(full))))
+    }
+}
+
+/// Levels of detail of the [`LOD_ERRORS`].
+fn simplified_levels(full: &Lod) -> [Lod; LOD_ERRORS.len()] {
+    let mut finer = full.clone();
+    LOD_ERRORS.map(|geometric_error| {
+        finer = Lod { geometric_error, ..simplify(&finer, geometric_error, f32::MAX) };
+        finer.clone()
+    })
 }
 
 impl LevelChain {

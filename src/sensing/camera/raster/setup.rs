@@ -1,6 +1,6 @@
 //! Edge functions, planes and bounding boxes of eight triangles at a time.
 
-use wide::{bytemuck::cast, f64x8};
+use wide::bytemuck::cast;
 
 use super::{NO_TRIANGLE, ScreenCorners};
 use crate::camera::math::{LANES, f32x8};
@@ -79,17 +79,6 @@ pub(crate) struct TriangleBlock {
     to: [[u32; LANES]; 2],
 }
 
-fn to_f64(x: f32x8) -> f64x8 {
-    f64x8::new(x.to_array().map(f64::from))
-}
-
-fn to_f32(x: f64x8) -> f32x8 {
-    f32x8::new(x.to_array().map(|x| x as f32))
-}
-
-/// Three values at each of the corners of eight triangles.
-type Corners = [[f64x8; 3]; 3];
-
 impl TriangleBlock {
     /// Sets up to eight triangles up, each given by its corners and its id.
     ///
@@ -111,16 +100,15 @@ impl TriangleBlock {
             }
         }
         let corners = corners.map(|corner| corner.map(f32x8::new));
-        let exact: Corners = corners.map(|corner| corner.map(to_f64));
-        let [a, b, c] = &exact;
+        let [a, b, c] = &corners;
         let (bx, by, bw) = (b[0] - a[0], b[1] - a[1], b[2] - a[2]);
         let (cx, cy, cw) = (c[0] - a[0], c[1] - a[1], c[2] - a[2]);
         let area = bx * cy - cx * by;
-        let has_area = to_f32(area).simd_gt(f32x8::ZERO);
+        let has_area = area.simd_gt(f32x8::ZERO);
         let (dw_dx, dw_dy) = ((bw * cy - cw * by) / area, (bx * cw - cx * bw) / area);
-        let origin = target.origin.map(|x| f64x8::splat(f64::from(x)));
+        let origin = target.origin.map(f32x8::splat);
         let w = a[2] + dw_dx * (origin[0] - a[0]) + dw_dy * (origin[1] - a[1]);
-        let edges = [0, 1, 2].map(|i| edge_functions(&exact[i], &exact[(i + 1) % 3], &origin));
+        let edges = [0, 1, 2].map(|i| edge_functions(&corners[i], &corners[(i + 1) % 3], &origin));
         let low = |axis: usize| corners[0][axis].fast_min(corners[1][axis]).fast_min(corners[2][axis]);
         let high = |axis: usize| corners[0][axis].fast_max(corners[1][axis]).fast_max(corners[2][axis]);
         let size = target.size.map(|n| f32x8::splat(n as f32));
@@ -156,9 +144,9 @@ impl TriangleBlock {
             b: edges.map(|e| e.b.to_array()),
             c: edges.map(|e| e.c.to_array()),
             threshold: edges.map(|e| e.threshold.to_array()),
-            w: to_f32(w).to_array(),
-            dw_dx: to_f32(dw_dx).to_array(),
-            dw_dy: to_f32(dw_dy).to_array(),
+            w: w.to_array(),
+            dw_dx: dw_dx.to_array(),
+            dw_dy: dw_dy.to_array(),
             min_w: low(2).to_array(),
             max_w: high(2).to_array(),
             from: [columns[0], rows[0]],
@@ -211,8 +199,9 @@ struct EdgeFunctions {
     threshold: f32x8,
 }
 
+/// The edge functions of edges between two corners. They are wrong by less than the rounding of the corners' positions.
 #[inline(always)]
-fn edge_functions(from: &[f64x8; 3], to: &[f64x8; 3], origin: &[f64x8; 2]) -> EdgeFunctions {
+fn edge_functions(from: &[f32x8; 3], to: &[f32x8; 3], origin: &[f32x8; 2]) -> EdgeFunctions {
     // Both triangles of an edge compute it from the same end and differ in the sign only, so they round alike.
     let is_flipped = from[0].simd_gt(to[0]) | (from[0].simd_eq(to[0]) & from[1].simd_gt(to[1]));
     let end = |axis: usize| is_flipped.select(to[axis], from[axis]);
@@ -220,10 +209,10 @@ fn edge_functions(from: &[f64x8; 3], to: &[f64x8; 3], origin: &[f64x8; 2]) -> Ed
     let (px, py) = (end(0), end(1));
     let (a, b) = (py - other_end(1), other_end(0) - px);
     let c = a * (origin[0] - px) + b * (origin[1] - py);
-    let signed = |x: f64x8| is_flipped.select(-x, x);
+    let signed = |x: f32x8| is_flipped.select(-x, x);
     let (a, b, c) = (signed(a), signed(b), signed(c));
-    let zero = f64x8::ZERO;
+    let zero = f32x8::ZERO;
     let owns_edge = a.simd_gt(zero) | (a.simd_eq(zero) & b.simd_gt(zero));
-    let threshold = owns_edge.select(f64x8::splat(-f64::from(f32::MIN_POSITIVE)), zero);
-    EdgeFunctions { a: to_f32(a), b: to_f32(b), c: to_f32(c), threshold: to_f32(threshold) }
+    let threshold = owns_edge.select(f32x8::splat(-f32::MIN_POSITIVE), zero);
+    EdgeFunctions { a, b, c, threshold }
 }

@@ -2,12 +2,12 @@
 //! or occlude are relit.
 
 use super::{
-    pass::{Bounds, RenderPass, bounds_of},
+    pass::RenderPass,
     tile::{PixelTargets, ShadingSink, TILE_PIXELS, TileChannels, TileDisplay},
 };
 use crate::camera::{
     image::RenderedImage,
-    math::{LANES, V3, Vec3x8, f32x8},
+    math::{Bounds, LANES, V3, Vec3x8, bounds_of, f32x8},
     raster::TileSamples,
     shade::{
         occlusion::{OcclusionEllipsoid, sky_visibility},

@@ -4,7 +4,7 @@ use super::{interpolate::MeshInstance, moving::MovingObjects};
 use crate::camera::{
     error::CameraError,
     lens::Lens,
-    math::{V3, Vec3x8, f32x8, higher, lower},
+    math::{Bounds, V3, Vec3x8, f32x8},
     raster::{TileBins, first_triangle_id, object_index, triangle_index},
     scene::{FrameView, RenderObject, RenderScene},
     shade::{
@@ -19,21 +19,6 @@ use softvt_physics::BodyId;
 const MAX_OCCLUDER_EXTENT: f32 = 0.35;
 /// Factor on the bounding radius in the frustum test: finer levels may exceed the one that casts shadows a little.
 const BOUNDS_MARGIN: f32 = 1.1;
-
-/// Lowest and highest corner of a bounding box.
-pub(crate) type Bounds = [V3; 2];
-
-/// Bounds of points; inverted without any.
-pub(crate) fn bounds_of(points: impl IntoIterator<Item = V3>) -> Bounds {
-    let mut bounds = [V3::repeat(f32::MAX), V3::repeat(f32::MIN)];
-    for p in points {
-        for axis in 0..3 {
-            bounds[0][axis] = lower(bounds[0][axis], p[axis]);
-            bounds[1][axis] = higher(bounds[1][axis], p[axis]);
-        }
-    }
-    bounds
-}
 
 /// An object of a scene in the state of an image.
 pub(crate) struct PosedObject<'a> {
@@ -73,7 +58,7 @@ impl<'a> PosedObject<'a> {
         };
         let caster_level = mesh.caster()?;
         let caster = pose(caster_level)?;
-        let bounds @ [low, high] = bounds_of(caster.posed.positions.iter().copied());
+        let bounds @ [low, high] = caster.posed.bounds;
         let (centre, radius) = ((low + high) * 0.5, 0.5 * (high - low).norm());
         let is_hidden = view.hidden_id != 0 && object.segmentation_id == view.hidden_id;
         let margin = (BOUNDS_MARGIN - 1.0) * radius;
