@@ -177,16 +177,12 @@ impl RenderScene {
             });
         }
         let still_meshes = StillMeshes::new(&objects);
-        let mut bounds = Vec::new();
-        let mut casters = Vec::new();
-        for (index, object) in objects.iter().enumerate().filter(|(_, object)| object.is_fixed()) {
-            let level = object.mesh.caster()?;
-            let posed = still_meshes.get(&objects, index, level, &rest)?;
-            bounds.push(posed.clone());
-            if object.casts_shadow {
-                casters.push((posed, object.mesh.level(level)?));
-            }
-        }
+        let is_fixed: Vec<bool> = objects.iter().map(RenderObject::is_fixed).collect();
+        let casters = still_meshes.casters(&objects, &is_fixed, &rest)?;
+        let fixed = (0..objects.len()).filter(|&index| is_fixed[index]);
+        let bounds =
+            fixed.map(|index| still_meshes.get(&objects, index, objects[index].mesh.caster()?, &rest));
+        let bounds = bounds.collect::<Result<Vec<_>, _>>()?;
         let fixed_shadow = Arc::new(draw_shadow(ShadowMap::new(&lighting), &casters));
         let wide_shadow = wide_shadow_radius(&bounds, &lighting)
             .map(|radius| draw_shadow(ShadowMap::with_radius(&lighting, radius), &casters));
@@ -225,12 +221,7 @@ impl RenderScene {
             kept[index..].rotate_left(1);
             return Ok(kept[kept.len() - 1].map.clone());
         }
-        let mut casters = Vec::new();
-        for (index, object) in self.objects.iter().enumerate().filter(|(i, o)| is_still[*i] && o.casts_shadow)
-        {
-            let level = object.mesh.caster()?;
-            casters.push((self.still_mesh(index, level)?, object.mesh.level(level)?));
-        }
+        let casters = self.still_meshes.casters(&self.objects, is_still, &self.rest)?;
         let map = Arc::new(draw_shadow(ShadowMap::new(&self.lighting), &casters));
         if kept.len() == KEPT_SHADOWS {
             kept.remove(0);
@@ -263,6 +254,21 @@ impl StillMeshes {
     fn new(objects: &[RenderObject]) -> Self {
         let levels = |object: &RenderObject| vec![OnceLock::new(); object.mesh.level_count()];
         Self(objects.iter().map(levels).collect())
+    }
+
+    /// The objects that stand still and cast shadows, at the level of detail that does.
+    fn casters<'a>(
+        &self,
+        objects: &'a [RenderObject],
+        is_still: &[bool],
+        rest: &RestState,
+    ) -> Result<Vec<(Arc<PosedMesh>, &'a Lod)>, CameraError> {
+        let casters = objects.iter().enumerate().filter(|(i, object)| is_still[*i] && object.casts_shadow);
+        let posed = |(index, object): (usize, &'a RenderObject)| {
+            let level = object.mesh.caster()?;
+            Ok((self.get(objects, index, level, rest)?, object.mesh.level(level)?))
+        };
+        casters.map(posed).collect()
     }
 
     fn get(

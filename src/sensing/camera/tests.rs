@@ -231,7 +231,7 @@ fn objects_at_rest_look_as_moving_ones_do() {
         let expected: Vec<f64> = expected.rgb.iter().map(|&c| c.into()).collect();
         let difference = difference(&expected, &image.rgb);
         assert!(difference < 0.02, "{x}: {difference}");
-        // What was drawn before has no influence.
+        // The image does not depend on earlier ones.
         assert_eq!(Renderer::default().render(&resting, &view, &camera).expect("an image"), image, "{x}");
         image
     };

@@ -553,7 +553,7 @@ type Tile = [u32; TILE_TEXELS];
 struct MipLevel {
     /// Width and height, texels.
     size: [usize; 2],
-    /// Row by row.
+    /// The tiles, row by row; empty until they are seen.
     tiles: Vec<OnceLock<Box<Tile>>>,
 }
 

@@ -79,7 +79,7 @@ impl SamplePlane {
     }
 }
 
-/// Eight samples.
+/// Eight neighbouring samples of a plane.
 struct SampleChunk<'a> {
     w: &'a mut [f32; LANES],
     ids: &'a mut [u32; LANES],
