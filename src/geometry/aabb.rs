@@ -32,16 +32,19 @@ impl Aabb {
     }
 
     /// Edge lengths, m.
+    #[inline]
     pub fn size(&self) -> Vec3 {
         self.max - self.min
     }
 
     /// Midpoint between the corners, m.
+    #[inline]
     pub fn centre(&self) -> Vec3 {
         0.5 * (self.min + self.max)
     }
 
     /// The box enlarged by `margin` (m) on every side.
+    #[inline]
     pub fn loosened(&self, margin: f64) -> Self {
         Self { min: self.min.add_scalar(-margin), max: self.max.add_scalar(margin) }
     }
@@ -59,11 +62,13 @@ impl Aabb {
     }
 
     /// True if the boxes overlap or touch.
+    #[inline]
     pub fn intersects(&self, other: &Self) -> bool {
         (0..3).all(|i| self.min[i] <= other.max[i] && other.min[i] <= self.max[i])
     }
 
     /// True if the point lies inside or on a face.
+    #[inline]
     pub fn contains(&self, p: &Vec3) -> bool {
         (0..3).all(|i| self.min[i] <= p[i] && p[i] <= self.max[i])
     }

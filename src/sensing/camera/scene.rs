@@ -392,10 +392,11 @@ impl PosedMesh {
         if nodes.iter().any(|p| !p.iter().all(|x| x.is_finite())) {
             return Err("a node position that is not a number".to_owned());
         }
+        let nodes: Vec<V3> = nodes.iter().map(|p| p.cast()).collect();
         let position = |vertex: &NodeWeights| {
             let mut p = V3::zeros();
             for (&node, weight) in vertex.nodes.iter().zip(&vertex.weights) {
-                p += nodes[node as usize].cast::<f32>() * *weight;
+                p += nodes[node as usize] * *weight;
             }
             p
         };

@@ -17,7 +17,7 @@ use wide::{bytemuck::cast, i32x8, u32x8};
 
 use super::lod::{CreasedMesh, Lod};
 use crate::camera::{
-    math::{LANES, V3, Vec3x8, approx_log2, f32x8, higher, lower},
+    math::{LANES, V3, Vec3x8, approx_log2, f32x8},
     shade::pattern::{self, METALNESS, MaterialSample, PatternPoint, PatternPoints, sample_visual},
 };
 use softvt_geometry::{mesh::Mesh, shape::Shape, union_find::UnionFind};
@@ -236,17 +236,17 @@ impl TextureChart {
         let coarsest = f32x8::splat((self.levels.len() - 1) as f32);
         let texels = footprint * f32x8::splat(1.0 / self.texel);
         let level = approx_log2(texels.fast_max(f32x8::ONE)).fast_max(f32x8::ZERO).fast_min(coarsest);
-        let lanes = level.to_array();
         // A level contributes up to three quarters of the way to the next one.
-        let low = (lanes.into_iter().fold(f32::MAX, lower) - 0.75).ceil().max(0.0) as usize;
-        let high = (lanes.into_iter().fold(0.0, higher) + 0.75) as usize;
+        let reach = f32x8::splat(0.75);
+        let low = extreme((level - reach).ceil().fast_max(f32x8::ZERO).fast_trunc_int(), i32::min);
+        let high = extreme((level + reach).fast_trunc_int(), i32::max);
         let mut sum = [f32x8::ZERO; 4];
-        for k in low..=high.min(self.levels.len() - 1) {
+        for (k, mip) in (0..=high).zip(&self.levels).skip(low as usize) {
             let distance = (level - f32x8::splat(k as f32)).abs();
             let weight = f32x8::splat(1.5) - f32x8::splat(2.0) * distance;
             let weight = weight.fast_max(f32x8::ZERO).fast_min(f32x8::ONE);
             let scale = f32x8::splat(1.0 / (1_u32 << k) as f32);
-            let values = self.levels[k].sample(u * scale, v * scale, |corner| self.paint(k, corner));
+            let values = mip.sample(u * scale, v * scale, |corner| self.paint(k as usize, corner));
             (0..4).for_each(|c| sum[c] += weight * values[c]);
         }
         let [x, y, z, roughness] = sum;
@@ -548,11 +548,26 @@ const TILE_TEXELS: usize = TILE_STRIDE * TILE_STRIDE;
 /// The packed texels of a tile, row by row; those beyond the level are 0.
 type Tile = [u32; TILE_TEXELS];
 
+/// The extreme of eight numbers, which are mostly the same.
+#[inline(always)]
+fn extreme(of: i32x8, extreme: impl Fn(i32, i32) -> i32) -> i32 {
+    let lanes = of.to_array();
+    if of.simd_eq(i32x8::splat(lanes[0])).all() {
+        lanes[0]
+    } else {
+        lanes.into_iter().fold(lanes[0], extreme)
+    }
+}
+
 /// A level of a mip map, in tiles of packed texels.
 #[derive(Clone, Debug)]
 struct MipLevel {
     /// Width and height, texels.
     size: [usize; 2],
+    /// Indices of the last column and row.
+    last: [f32; 2],
+    /// Tiles in a row.
+    tile_columns: i32,
     /// The tiles, row by row; empty until they are seen.
     tiles: Vec<OnceLock<Box<Tile>>>,
 }
@@ -560,7 +575,8 @@ struct MipLevel {
 impl MipLevel {
     fn new(size: [usize; 2]) -> Self {
         let [columns, rows] = size.map(|n| n.div_ceil(TILE));
-        Self { size, tiles: vec![OnceLock::new(); columns * rows] }
+        let last = size.map(|n| (n - 1) as f32);
+        Self { size, last, tile_columns: columns as i32, tiles: vec![OnceLock::new(); columns * rows] }
     }
 
     /// Width and height of the tile whose first texel is `corner`, with the row and column of the next ones.
@@ -572,14 +588,12 @@ impl MipLevel {
     /// tile whose first texel it is given.
     #[inline(always)]
     fn sample(&self, u: f32x8, v: f32x8, paint: impl Fn([usize; 2]) -> Box<Tile>) -> [f32x8; 4] {
-        let clamped = |x: f32x8, count: usize| {
-            (x - f32x8::splat(0.5)).fast_max(f32x8::ZERO).fast_min(f32x8::splat((count - 1) as f32))
-        };
-        let (x, y) = (clamped(u, self.size[0]), clamped(v, self.size[1]));
+        let clamped =
+            |x: f32x8, last: f32| (x - f32x8::HALF).fast_max(f32x8::ZERO).fast_min(f32x8::splat(last));
+        let (x, y) = (clamped(u, self.last[0]), clamped(v, self.last[1]));
         let (i, j) = (x.fast_trunc_int(), y.fast_trunc_int());
-        let columns = self.size[0].div_ceil(TILE);
         let tile_bits = const { TILE.ilog2() as i32 };
-        let tiles = (j >> tile_bits) * i32x8::splat(columns as i32) + (i >> tile_bits);
+        let tiles = (j >> tile_bits) * i32x8::splat(self.tile_columns) + (i >> tile_bits);
         let is_one_tile = tiles.simd_eq(i32x8::splat(tiles.to_array()[0])).all();
         let within = i32x8::splat(TILE as i32 - 1);
         let at = ((j & within) * i32x8::splat(TILE_STRIDE as i32) + (i & within)).to_array();

@@ -21,6 +21,12 @@ const INSET: f32 = 0.125;
 
 /// Number of pixels that eight samples belong to.
 const PIXELS_PER_CHUNK: usize = LANES / SAMPLES_PER_PIXEL;
+/// Minimum width, chunks, of triangles for which the span of each row is found first.
+const MIN_WIDE_CHUNKS: usize = 4;
+/// Maximum slope, columns per row, of the edges that bound spans.
+const MAX_SPAN_SLOPE: f32 = 1e3;
+/// Relative rounding error of spans and edge functions: 32 ulp.
+const SPAN_ROUNDING: f32 = 32.0 * f32::EPSILON;
 /// Position of each of the eight samples of two neighbouring pixels.
 const CHUNK_X: f32x8 = f32x8::new(chunk_offsets(0));
 const CHUNK_Y: f32x8 = f32x8::new(chunk_offsets(1));
@@ -123,6 +129,57 @@ impl ChunkPlane {
     }
 }
 
+/// A triangle, to be evaluated at the samples of chunks.
+struct ChunkPlanes {
+    edges: [ChunkPlane; 3],
+    thresholds: [f32x8; 3],
+    w: ChunkPlane,
+    /// Range of w.
+    range: [f32x8; 2],
+    id: u32,
+    is_full: bool,
+}
+
+impl ChunkPlanes {
+    #[inline(always)]
+    fn new(t: &TriangleSetup) -> Self {
+        Self {
+            edges: t.edges.map(|e| ChunkPlane::new(e.c, e.a, e.b)),
+            thresholds: t.edges.map(|e| f32x8::splat(e.threshold)),
+            w: ChunkPlane::new(t.w, t.dw_dx, t.dw_dy),
+            range: [t.min_w, t.max_w].map(f32x8::splat),
+            id: t.id,
+            is_full: t.coverage == Coverage::Full,
+        }
+    }
+}
+
+impl TriangleSetup {
+    /// Chunks in which a triangle may cover samples, in eight rows from `first` on: the first one, and the end of the
+    /// last one.
+    #[inline(always)]
+    fn chunk_spans(&self, first: usize) -> [[i32; LANES]; 2] {
+        let y = LANE_INDEX + f32x8::splat(first as f32 + 0.5);
+        let edge = TILE_EDGE as f32;
+        let (mut low, mut high) = (f32x8::ZERO, f32x8::splat(edge - 1.0));
+        for e in &self.edges {
+            // Edges along a row bound nothing.
+            let is_steep = e.b.abs() < MAX_SPAN_SLOPE * e.a.abs();
+            let inverse = if is_steep { -1.0 / e.a } else { 0.0 };
+            let (at_origin, slope) = (e.c * inverse, e.b * inverse);
+            let rounding = SPAN_ROUNDING * (edge + at_origin.abs() + edge * slope.abs());
+            let reach = (0.5 - INSET) * slope.abs() + rounding;
+            let bound = |bounds: bool, reach: f32, none: f32| f32x8::splat(if bounds { reach } else { none });
+            let crossing = y * f32x8::splat(slope) + f32x8::splat(at_origin);
+            low = low.fast_max(crossing + bound(is_steep && e.a > 0.0, -reach, f32::NEG_INFINITY));
+            high = high.fast_min(crossing + bound(is_steep && e.a < 0.0, reach, f32::INFINITY));
+        }
+        let per_pixel = f32x8::splat(1.0 / PIXELS_PER_CHUNK as f32);
+        let to = (high * per_pixel + f32x8::ONE).fast_max(f32x8::ZERO);
+        [(low.fast_min(f32x8::splat(edge)) * per_pixel), to].map(|x| x.fast_trunc_int().to_array())
+    }
+}
+
 impl TileSamples {
     /// The tile whose first pixel is `origin`.
     pub(crate) fn target(origin: [f32; 2]) -> DrawTarget {
@@ -185,30 +242,38 @@ impl TileSamples {
     #[inline(always)]
     fn draw_colours(&mut self, t: &TriangleSetup) {
         self.drawn_rows = [self.drawn_rows[0].min(t.rows[0]), self.drawn_rows[1].max(t.rows[1])];
-        let edges = t.edges.map(|e| ChunkPlane::new(e.c, e.a, e.b));
-        let thresholds = t.edges.map(|e| f32x8::splat(e.threshold));
-        let plane = ChunkPlane::new(t.w, t.dw_dx, t.dw_dy);
-        let (min_w, max_w) = (f32x8::splat(t.min_w), f32x8::splat(t.max_w));
+        let planes = ChunkPlanes::new(t);
         let chunks = t.columns[0] / PIXELS_PER_CHUNK..t.columns[1].div_ceil(PIXELS_PER_CHUNK);
-        let first_x = CHUNK_X + f32x8::splat((chunks.start * PIXELS_PER_CHUNK) as f32);
-        let mut y = t.rows[0] as f32;
-        for row in t.rows[0]..t.rows[1] {
-            let at = row * (TILE_EDGE / PIXELS_PER_CHUNK);
-            let (row_edges, row_w) = (edges.map(|edge| edge.row(y)), plane.row(y));
-            let mut x = first_x;
-            for mut chunk in self.colours.chunks(at + chunks.start..at + chunks.end) {
-                // The plane of w, extrapolated to samples outside the triangle's edges, is clamped to the corners'
-                // range.
-                let w = (row_w + plane.slope * x).fast_max(min_w).fast_min(max_w);
-                let inside = |i: usize| (row_edges[i] + edges[i].slope * x).simd_gt(thresholds[i]);
-                if t.coverage == Coverage::Full {
-                    chunk.draw(w, t.id, || f32x8::splat(f32::from_bits(u32::MAX)));
-                } else {
-                    chunk.draw(w, t.id, || inside(0) & inside(1) & inside(2));
-                }
-                x += f32x8::splat(PIXELS_PER_CHUNK as f32);
+        if t.coverage == Coverage::Full || chunks.len() < MIN_WIDE_CHUNKS {
+            (t.rows[0]..t.rows[1]).for_each(|row| self.draw_row(&planes, row, chunks.clone()));
+            return;
+        }
+        for first in (t.rows[0]..t.rows[1]).step_by(LANES) {
+            let [from, to] = t.chunk_spans(first);
+            for (row, (from, to)) in (first..t.rows[1]).zip(from.into_iter().zip(to)) {
+                let span = chunks.start.max(from as usize)..chunks.end.min(to as usize);
+                self.draw_row(&planes, row, span);
             }
-            y += 1.0;
+        }
+    }
+
+    /// Draws some chunks of a row of the colours.
+    #[inline(always)]
+    fn draw_row(&mut self, planes: &ChunkPlanes, row: usize, chunks: std::ops::Range<usize>) {
+        let ChunkPlanes { edges, thresholds, w: plane, range: [min_w, max_w], id, is_full } = planes;
+        let (at, y) = (row * (TILE_EDGE / PIXELS_PER_CHUNK), row as f32);
+        let (row_edges, row_w) = (edges.map(|edge| edge.row(y)), plane.row(y));
+        let mut x = CHUNK_X + f32x8::splat((chunks.start * PIXELS_PER_CHUNK) as f32);
+        for mut chunk in self.colours.chunks(at + chunks.start..at + chunks.end) {
+            // The plane of w, extrapolated to samples outside the triangle's edges, is clamped to the corners' range.
+            let w = (row_w + plane.slope * x).fast_max(*min_w).fast_min(*max_w);
+            let inside = |i: usize| (row_edges[i] + edges[i].slope * x).simd_gt(thresholds[i]);
+            if *is_full {
+                chunk.draw(w, *id, || f32x8::splat(f32::from_bits(u32::MAX)));
+            } else {
+                chunk.draw(w, *id, || inside(0) & inside(1) & inside(2));
+            }
+            x += f32x8::splat(PIXELS_PER_CHUNK as f32);
         }
     }
 
@@ -249,5 +314,39 @@ impl TileSamples {
         let at = y * TILE_EDGE + x;
         let ids = self.centres.ids[at..].first_chunk().copied().unwrap_or([NO_TRIANGLE; LANES]);
         (ids, f32x8::new(self.centres.w[at..].first_chunk().copied().unwrap_or_default()))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{super::setup::TriangleBlock, *};
+
+    #[test]
+    fn spans_leave_out_no_sample_that_a_triangle_covers() {
+        // Pseudo-random corners, up to 1e4 px outside the tile, many of them at samples, and nearly level edges.
+        let mut seed = 1_u32;
+        let mut random = |reach: f32, step: f32| {
+            seed = seed.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            let at = 16.0 + reach * (seed as f32 / u32::MAX as f32 - 0.5);
+            if step > 0.0 { (at / step).round() * step } else { at }
+        };
+        let mut drawn = 0;
+        for i in 0..6000 {
+            let (reach, step) = ([40.0, 400.0, 2e4][i % 3], [0.0, 0.125, 0.25, 1.0][i / 3 % 4]);
+            let height = if i % 2 == 0 { reach } else { 4.0 };
+            let corners = [0, 1, 2].map(|_| [random(reach, step), random(height, step), 1.0]);
+            let block = TriangleBlock::new([(&corners, 7)].into_iter(), &TileSamples::target([0.0; 2]));
+            for t in block.triangles() {
+                let [mut by_spans, mut by_rows] = [0, 1].map(|_| TileSamples::new(0.0, true, false));
+                by_spans.draw(&t);
+                let chunks = t.columns[0] / PIXELS_PER_CHUNK..t.columns[1].div_ceil(PIXELS_PER_CHUNK);
+                for row in t.rows[0]..t.rows[1] {
+                    by_rows.draw_row(&ChunkPlanes::new(&t), row, chunks.clone());
+                }
+                assert_eq!(by_spans.colours.ids, by_rows.colours.ids, "{corners:?}");
+                drawn += by_rows.colours.ids.iter().filter(|id| **id == 7).count();
+            }
+        }
+        assert!(drawn > 200_000, "{drawn} samples");
     }
 }

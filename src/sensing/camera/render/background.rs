@@ -2,7 +2,7 @@
 //! or occlude are relit.
 
 use super::{
-    pass::RenderPass,
+    pass::{LitSurface, RenderPass},
     tile::{PixelTargets, ShadingSink, TILE_PIXELS, TileChannels, TileDisplay},
 };
 use crate::camera::{
@@ -11,7 +11,7 @@ use crate::camera::{
     raster::TileSamples,
     shade::{
         occlusion::{OcclusionEllipsoid, sky_visibility},
-        shading::{DirectAndAmbient, SurfaceSamples},
+        shading::DirectAndAmbient,
     },
 };
 use softvt_scene::Camera;
@@ -67,7 +67,7 @@ impl BackgroundTile {
         let is_surface = |i: &usize| (0..3).any(|c| self.n.0[c][*i] != 0.0);
         let points = || (0..TILE_PIXELS).filter(is_surface).map(|i| V3::from_fn(|c, _| self.p.0[c][i]));
         let in_light_space = |p: V3| {
-            let at = pass.moving_shadow.project(Vec3x8::splat(&p));
+            let at = pass.in_light_space(Vec3x8::splat(&p));
             V3::from([at.u, at.v, at.height_above_ground].map(|x| x.to_array()[0]))
         };
         self.bounds = [bounds_of(points()), bounds_of(points().map(in_light_space))];
@@ -97,7 +97,8 @@ impl BackgroundTile {
                 continue;
             };
             let (p, n) = (self.p.load(first), self.n.load(first));
-            let key = pass.scene.illumination.key_visibility(p, &n, pass.moving_shadow);
+            let at = pass.in_light_space(p);
+            let key = pass.scene.illumination.key_visibility(&at, &n, pass.moving_shadow);
             // No object has the index −1: the surfaces stand still, the occluders do not.
             let sky = sky_visibility(occluders, p, n, f32x8::splat(-1.0));
             if (key.simd_lt(f32x8::ONE) | sky.simd_lt(f32x8::ONE)).any() {
@@ -117,12 +118,12 @@ impl ShadingSink for BackgroundTile {
         &mut self,
         pass: &RenderPass,
         radiance: DirectAndAmbient,
-        surface: Option<&SurfaceSamples>,
+        surface: Option<LitSurface>,
         targets: &PixelTargets,
     ) {
         let display = pass.scene.tone_mapper.display(radiance.direct + radiance.ambient).to_arrays();
         let (direct, ambient) = (radiance.direct.to_arrays(), radiance.ambient.to_arrays());
-        let surface = surface.map(|samples| [samples.p.to_arrays(), samples.n.to_arrays()]);
+        let surface = surface.map(|LitSurface { points, .. }| [points.p.to_arrays(), points.n.to_arrays()]);
         targets.for_each(|lane, pixel, share| {
             for c in 0..3 {
                 self.display.0[c][pixel] += share * display[c][lane];

@@ -10,7 +10,7 @@ pub(crate) mod tile;
 use background::{BackgroundTile, CachedBackground};
 use moving::MovingObjects;
 use pass::{Channels, PosedObject, RenderPass};
-use tile::{TileDisplay, TileRect, TileResolver, is_all_moving};
+use tile::{PreparedTriangles, TileDisplay, TileRect, TileResolver, is_all_moving};
 
 use super::{
     error::CameraError,
@@ -177,11 +177,12 @@ fn blank_samples(pass: &RenderPass) -> TileSamples {
 fn draw_all(pass: &RenderPass, bins: &mut TileBins) -> RenderedImage {
     pass.bin(&[false, true], bins);
     let (mut image, mut display) = (blank_image(pass), TileDisplay::zeros());
-    let (mut samples, mut blocks) = (blank_samples(pass), Vec::new());
+    let (mut samples, mut blocks, mut prepared) =
+        (blank_samples(pass), Vec::new(), PreparedTriangles::default());
     for (tile, rect) in TileRect::all(pass.lens).enumerate() {
         samples.clear(1.0 / pass.lens.far);
         let covering = bins.draw_tile(tile, rect.origin(), &mut samples, &mut blocks, true);
-        let mut resolver = TileResolver::new(pass, rect, &samples, &mut display, &mut image);
+        let mut resolver = TileResolver::new(pass, rect, &samples, &mut display, &mut image, &mut prepared);
         match covering {
             _ if !pass.channels.has_colours() => resolver.run_centres(),
             Some(id) => resolver.run_covered(id),
@@ -221,7 +222,8 @@ fn draw_background_tile(
     let mut samples = blank_samples(pass);
     bins.draw_tile(tile, rect.origin(), &mut samples, &mut Vec::new(), false);
     let mut background = BackgroundTile::new();
-    TileResolver::new(pass, rect, &samples, &mut background, image).run(false);
+    let mut prepared = PreparedTriangles::default();
+    TileResolver::new(pass, rect, &samples, &mut background, image, &mut prepared).run(false);
     background.finish(pass, samples);
     background
 }
@@ -261,34 +263,40 @@ fn draw_by_tiles(pass: &RenderPass, still_bins: &mut TileBins) -> RenderedImage 
 }
 
 /// Working memory for the moving objects in one tile.
-struct TileWorkspace {
+struct TileWorkspace<'a> {
     samples: TileSamples,
     blocks: Vec<TriangleBlock>,
     display: TileDisplay,
+    prepared: PreparedTriangles<'a>,
 }
 
-impl TileWorkspace {
+impl<'a> TileWorkspace<'a> {
     fn new(pass: &RenderPass) -> Self {
-        Self { samples: blank_samples(pass), blocks: Vec::new(), display: TileDisplay::zeros() }
+        Self {
+            samples: blank_samples(pass),
+            blocks: Vec::new(),
+            display: TileDisplay::zeros(),
+            prepared: PreparedTriangles::default(),
+        }
     }
 
     /// Draws the moving objects of a tile over its background, which `image` shows already.
     fn draw_over(
         &mut self,
-        pass: &RenderPass,
+        pass: &RenderPass<'a>,
         tile: usize,
         rect: TileRect,
         still: &BackgroundTile,
         bins: &TileBins,
         image: &mut RenderedImage,
     ) {
-        let Self { samples, blocks, display } = self;
+        let Self { samples, blocks, display, prepared } = self;
         let occluders = still.moving_occluders(pass);
         if bins.is_occupied(tile) {
             samples.copy_rows(&still.samples, bins.rows(tile, rect.origin()[1]));
             bins.draw_tile(tile, rect.origin(), samples, blocks, false);
             still.relight(pass, occluders.as_deref(), |first| is_all_moving(samples, first), display);
-            TileResolver::new(pass, rect, samples, display, image).run(true);
+            TileResolver::new(pass, rect, samples, display, image, prepared).run(true);
         } else if occluders.is_some() {
             still.relight(pass, occluders.as_deref(), |_| false, display);
         } else {

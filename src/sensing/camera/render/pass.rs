@@ -10,7 +10,7 @@ use crate::camera::{
     shade::{
         occlusion::{OcclusionEllipsoid, sky_visibility},
         shading::{DirectAndAmbient, LightBySource, SurfaceSamples},
-        shadow::ShadowMap,
+        shadow::{LightSpacePoints, ShadowMap},
     },
 };
 use softvt_physics::BodyId;
@@ -132,6 +132,13 @@ impl Channels {
     }
 }
 
+/// Eight surface points, and the same in the frame of the fine shadow maps.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct LitSurface<'a> {
+    pub(crate) points: &'a SurfaceSamples,
+    pub(crate) at: &'a LightSpacePoints,
+}
+
 /// Fractions of the light that objects leave.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Visibility {
@@ -152,29 +159,35 @@ impl RenderPass<'_> {
         Some([object_index(id), mesh.lod.smoothing_groups[triangle_index(id)] as usize])
     }
 
+    /// Points of the world in the frame of the fine shadow maps.
+    #[inline(always)]
+    pub(crate) fn in_light_space(&self, p: Vec3x8) -> LightSpacePoints {
+        self.moving_shadow.project(p)
+    }
+
     /// Radiance of points that only still objects shadow and occlude.
     #[inline(always)]
-    pub(crate) fn shade(&self, points: &SurfaceSamples) -> DirectAndAmbient {
-        self.light(points).radiance(points.diffuse_albedo())
+    pub(crate) fn shade(&self, surface: &LitSurface) -> DirectAndAmbient {
+        self.light(surface).radiance(surface.points.diffuse_albedo())
     }
 
     /// Light reflected by points that only still objects shadow and occlude.
     #[inline(always)]
-    pub(crate) fn light(&self, points: &SurfaceSamples) -> LightBySource {
+    pub(crate) fn light(&self, &LitSurface { points, at }: &LitSurface) -> LightBySource {
         let to_eye = (Vec3x8::splat(&self.lens.eye) - points.p).normalized();
         let illumination = &self.scene.illumination;
         let LightBySource { direct, ambient } = illumination.reflect(points, to_eye);
         let (fine, wide) = (self.still_shadow, self.scene.wide_shadow.as_ref());
-        let key = illumination.key_visibility_cascaded(points.p, &points.n, fine, wide);
+        let key = illumination.key_visibility_cascaded(points.p, at, &points.n, fine, wide);
         let sky = sky_visibility(self.still_occluders, points.p, points.n, points.object);
         LightBySource { direct: direct * key, ambient: ambient * sky }
     }
 
     /// Fractions of the key light and of the sky that moving objects leave.
     #[inline(always)]
-    pub(crate) fn moving_visibility(&self, points: &SurfaceSamples) -> Visibility {
+    pub(crate) fn moving_visibility(&self, &LitSurface { points, at }: &LitSurface) -> Visibility {
         Visibility {
-            key: self.scene.illumination.key_visibility(points.p, &points.n, self.moving_shadow),
+            key: self.scene.illumination.key_visibility(at, &points.n, self.moving_shadow),
             sky: sky_visibility(self.moving_occluders, points.p, points.n, points.object),
         }
     }

@@ -1,10 +1,7 @@
 //! Shading of rows of eight pixels, one below the other, on one plane: light is evaluated in some rows and interpolated
 //! between them where it changes linearly. Textures are sampled in all rows.
 
-use crate::camera::{
-    math::{Vec3x8, f32x8},
-    shade::shadow::LightSpacePoints,
-};
+use crate::camera::math::{Vec3x8, f32x8};
 
 /// Maximum number of rows between two whose light is evaluated first.
 const SPAN: usize = 16;
@@ -82,11 +79,12 @@ pub(crate) fn is_close(light: &Vec3x8, interpolated: &Vec3x8) -> bool {
     (is_close(|v| v.x) & is_close(|v| v.y) & is_close(|v| v.z)).all()
 }
 
-/// True if no shadow can fall between two rows without touching either.
+/// True if no shadow can fall between two rows without touching either; given their columns and rows in the shadow map,
+/// texels.
 #[inline(always)]
-pub(crate) fn is_near(a: &LightSpacePoints, b: &LightSpacePoints) -> bool {
-    let is_near = |x: f32x8, y: f32x8| (x - y).abs().simd_le(f32x8::splat(MAX_DISTANCE));
-    (is_near(a.u, b.u) & is_near(a.v, b.v)).all()
+pub(crate) fn is_near(a: &[f32x8; 2], b: &[f32x8; 2]) -> bool {
+    let is_near = |axis: usize| (a[axis] - b[axis]).abs().simd_le(f32x8::splat(MAX_DISTANCE));
+    (is_near(0) & is_near(1)).all()
 }
 
 #[cfg(test)]

@@ -4,7 +4,7 @@ use wide::u32x8;
 
 use super::{
     interpolate::{RowSamples, ShadingBatch, TriangleInterpolator},
-    pass::{RenderPass, Visibility},
+    pass::{LitSurface, RenderPass, Visibility},
     rows::{ShadedRows, is_close, is_near, mix, mix_vectors, shade_rows},
 };
 use crate::camera::{
@@ -14,10 +14,7 @@ use crate::camera::{
     raster::{
         MOVING_FLAG, NO_TRIANGLE, SAMPLE_OFFSETS, SAMPLES_PER_PIXEL, TILE_EDGE, TileSamples, object_index,
     },
-    shade::{
-        shading::{DirectAndAmbient, LightBySource, ReflectedLight, SurfaceSamples},
-        shadow::LightSpacePoints,
-    },
+    shade::shading::{DirectAndAmbient, LightBySource, ReflectedLight},
 };
 
 /// Maximum difference of roughness at which specular light is interpolated between rows.
@@ -126,7 +123,7 @@ pub(crate) trait ShadingSink {
         &mut self,
         pass: &RenderPass,
         radiance: DirectAndAmbient,
-        surface: Option<&SurfaceSamples>,
+        surface: Option<LitSurface>,
         targets: &PixelTargets,
     );
 
@@ -134,7 +131,8 @@ pub(crate) trait ShadingSink {
     fn add_rows(&mut self, pass: &RenderPass, triangle: &TriangleInterpolator, run: &RowRun) {
         for row in 0..run.count {
             let points = triangle.row(pass.lens, run.position(row)).points;
-            self.add(pass, pass.shade(&points), Some(&points), &PixelTargets::row(run.pixel(row)));
+            let surface = LitSurface { points: &points, at: &pass.in_light_space(points.p) };
+            self.add(pass, pass.shade(&surface), Some(surface), &PixelTargets::row(run.pixel(row)));
         }
     }
 }
@@ -179,11 +177,11 @@ impl ShadingSink for TileDisplay {
         &mut self,
         pass: &RenderPass,
         radiance: DirectAndAmbient,
-        surface: Option<&SurfaceSamples>,
+        surface: Option<LitSurface>,
         targets: &PixelTargets,
     ) {
-        let radiance = surface.map_or(radiance.ambient, |points| {
-            let Visibility { key, sky } = pass.moving_visibility(points);
+        let radiance = surface.map_or(radiance.ambient, |surface| {
+            let Visibility { key, sky } = pass.moving_visibility(&surface);
             radiance.direct * key + radiance.ambient * sky
         });
         let display = pass.scene.tone_mapper.display(radiance);
@@ -215,8 +213,8 @@ struct TriangleLight {
     roughness: f32x8,
     /// As in [`RowSamples`].
     footprint: f32x8,
-    /// The points in the frame of the moving shadows.
-    at: LightSpacePoints,
+    /// Columns and rows of the points in the fine shadow maps, texels.
+    texels: [f32x8; 2],
 }
 
 impl TriangleRows<'_, '_, '_> {
@@ -230,12 +228,13 @@ impl ShadedRows for TriangleRows<'_, '_, '_> {
 
     fn evaluate(&mut self, row: usize) -> TriangleLight {
         let RowSamples { points, footprint } = self.triangle.row(self.pass.lens, self.run.position(row));
-        let LightBySource { direct, ambient } = self.pass.light(&points);
-        let Visibility { key, sky } = self.pass.moving_visibility(&points);
+        let at = self.pass.in_light_space(points.p);
+        let surface = LitSurface { points: &points, at: &at };
+        let LightBySource { direct, ambient } = self.pass.light(&surface);
+        let Visibility { key, sky } = self.pass.moving_visibility(&surface);
         let reflected = direct * key + ambient * sky;
         self.store(row, reflected.radiance(points.diffuse_albedo()));
-        let at = self.pass.moving_shadow.project(points.p);
-        TriangleLight { reflected, roughness: points.roughness, footprint, at }
+        TriangleLight { reflected, roughness: points.roughness, footprint, texels: [at.u, at.v] }
     }
 
     fn is_linear(start: &TriangleLight, middle: &TriangleLight, end: &TriangleLight, share: f32) -> bool {
@@ -243,7 +242,7 @@ impl ShadedRows for TriangleRows<'_, '_, '_> {
             let [a, b] = [start, end].map(|light| of(&light.reflected));
             is_close(of(&middle.reflected), &mix_vectors(a, b, share))
         };
-        is_near(&start.at, &end.at)
+        is_near(&start.texels, &end.texels)
             && is_close_in(|light| &light.diffuse)
             && is_close_in(|light| &light.specular)
     }
@@ -332,8 +331,7 @@ pub(crate) struct TileResolver<'a, 'p, S> {
     sink: &'p mut S,
     /// Receives depth and segmentation.
     image: &'p mut RenderedImage,
-    recent: RecentTriangles<'a>,
-    batch: ShadingBatch<'a>,
+    prepared: &'p mut PreparedTriangles<'a>,
 }
 
 impl<'a, 'p, S: ShadingSink> TileResolver<'a, 'p, S> {
@@ -343,8 +341,9 @@ impl<'a, 'p, S: ShadingSink> TileResolver<'a, 'p, S> {
         samples: &'p TileSamples,
         sink: &'p mut S,
         image: &'p mut RenderedImage,
+        prepared: &'p mut PreparedTriangles<'a>,
     ) -> Self {
-        Self { pass, rect, samples, sink, image, recent: [None; RECENT], batch: ShadingBatch::default() }
+        Self { pass, rect, samples, sink, image, prepared }
     }
 
     /// Resolves all pixels, or only those that show a moving object; of the others, the samples need not be set. Depth
@@ -434,7 +433,7 @@ impl<'a, 'p, S: ShadingSink> TileResolver<'a, 'p, S> {
                 let targets = PixelTargets::row(run.pixel(row));
                 self.shade_background(f32x8::splat(px) + LANE_INDEX, f32x8::splat(py), &targets);
             }
-        } else if let Some(triangle) = interpolator(&mut self.recent, self.pass, id) {
+        } else if let Some(triangle) = interpolator(&mut self.prepared.recent, self.pass, id) {
             self.sink.add_rows(self.pass, triangle, &run);
         }
     }
@@ -480,25 +479,26 @@ impl<'a, 'p, S: ShadingSink> TileResolver<'a, 'p, S> {
             self.shade_background(f32x8::splat(x), f32x8::splat(y), &targets);
             return;
         }
-        if let Some(triangle) = interpolator(&mut self.recent, self.pass, id) {
-            let batch = &mut self.batch;
+        if let Some(triangle) = interpolator(&mut self.prepared.recent, self.pass, id) {
+            let batch = &mut self.prepared.batch;
             triangle.push(batch, x, y);
             (batch.pixel[batch.count], batch.share[batch.count]) = (pixel as u32, share);
             batch.count += 1;
         }
-        if self.batch.count == LANES {
+        if self.prepared.batch.count == LANES {
             self.flush();
         }
     }
 
     /// Shades the collected points.
     fn flush(&mut self) {
-        let ShadingBatch { count, pixel, share, .. } = self.batch;
+        let ShadingBatch { count, pixel, share, .. } = self.prepared.batch;
         if count > 0 {
             let targets = PixelTargets { pixel, share, count, is_row: false };
-            let points = self.batch.samples(self.pass.lens);
-            self.sink.add(self.pass, self.pass.shade(&points), Some(&points), &targets);
-            self.batch.count = 0;
+            let points = self.prepared.batch.samples(self.pass.lens);
+            let surface = LitSurface { points: &points, at: &self.pass.in_light_space(points.p) };
+            self.sink.add(self.pass, self.pass.shade(&surface), Some(surface), &targets);
+            self.prepared.batch.count = 0;
         }
     }
 }
@@ -537,11 +537,19 @@ pub(crate) fn is_all_moving(samples: &TileSamples, first: usize) -> bool {
     samples.rows().contains(&y) && ids.as_chunks::<LANES>().0.iter().all(|ids| moving_bits(ids) == 0xFF)
 }
 
-/// Number of prepared triangles that a tile keeps: neighbouring pixels alternate between a few.
+/// Number of prepared triangles that are kept: neighbouring pixels alternate between a few.
 const RECENT: usize = 32;
 
 /// Prepared triangles, by the last bits of their ids.
 type RecentTriangles<'a> = [Option<TriangleInterpolator<'a>>; RECENT];
+
+/// Triangles and points that are prepared for shading, kept from tile to tile of an image.
+#[derive(Default)]
+pub(crate) struct PreparedTriangles<'a> {
+    recent: RecentTriangles<'a>,
+    /// Empty between tiles.
+    batch: ShadingBatch<'a>,
+}
 
 /// Prepares triangle `id`, unless it is known. `None` if its object is out of view.
 fn interpolator<'m, 'a>(

@@ -1,6 +1,6 @@
 //! Reflected light at surface points, eight at a time.
 
-use super::shadow::ShadowMap;
+use super::shadow::{LightSpacePoints, ShadowMap};
 use crate::camera::math::{V3, Vec3x8, approx_exp2, f32x8};
 use softvt_scene::Lighting;
 
@@ -181,25 +181,26 @@ impl Illumination {
         ReflectedLight { diffuse, specular: specular.component_mul(diffuse) }
     }
 
-    /// Visible fraction of the key light at points `p` of normals `n`, by one shadow map.
+    /// Visible fraction of the key light at points of normals `n`, by one shadow map.
     #[inline(always)]
-    pub(crate) fn key_visibility(&self, p: Vec3x8, n: &Vec3x8, map: &ShadowMap) -> f32x8 {
-        map.visibility(&map.project(p), n, self.faces_key(n))
+    pub(crate) fn key_visibility(&self, at: &LightSpacePoints, n: &Vec3x8, map: &ShadowMap) -> f32x8 {
+        map.visibility(at, n, self.faces_key(n))
     }
 
     /// As [`key_visibility`](Self::key_visibility), by a fine map where it reaches and by a wide
-    /// one, if any, elsewhere.
+    /// one, if any, elsewhere; `p` are the points in the world.
     #[inline(always)]
     pub(crate) fn key_visibility_cascaded(
         &self,
         p: Vec3x8,
+        at: &LightSpacePoints,
         n: &Vec3x8,
         fine: &ShadowMap,
         wide: Option<&ShadowMap>,
     ) -> f32x8 {
-        let (at, faces_key) = (fine.project(p), self.faces_key(n));
-        let visibility = fine.visibility(&at, n, faces_key);
-        let is_beyond = faces_key & !fine.contains(&at);
+        let faces_key = self.faces_key(n);
+        let visibility = fine.visibility(at, n, faces_key);
+        let is_beyond = faces_key & !at.is_inside;
         match wide {
             Some(wide) if is_beyond.any() => visibility * wide.visibility(&wide.project(p), n, is_beyond),
             _ => visibility,

@@ -4,7 +4,7 @@
 //! Percentage-Closer Soft Shadows, SIGGRAPH sketches 2005). The range of heights around each point shows for most
 //! points that they are fully lit or fully dark, and these are not filtered at all.
 
-use wide::i32x8;
+use wide::{f32x4, i32x8};
 
 use crate::camera::{
     math::{LANE_INDEX, LANES, V3, Vec3x8, f32x8, higher, lower, sum_lanes},
@@ -69,37 +69,26 @@ const MIN_ELEVATION_SINE: f32 = 0.15;
 /// Height of empty texels, m.
 const EMPTY: f32 = -1e9;
 
-/// Heights around a point, relative to it and above level ground, m.
-#[derive(Clone, Copy, Debug)]
-struct HeightRange {
-    min: f32,
-    max: f32,
-    /// The highest within [`NEAR_RADIUS`].
-    near_max: f32,
-}
+/// A value for each tile of a map, row by row.
+type TilePlane = Box<[f32; TILES * TILES]>;
 
 /// Heights above level ground in and around each tile of a map, m.
 #[derive(Clone, Debug)]
 struct TileRanges {
-    min: Vec<f32>,
-    max: Vec<f32>,
-    near_max: Vec<f32>,
+    min: TilePlane,
+    max: TilePlane,
+    /// The highest within [`NEAR_RADIUS`].
+    near_max: TilePlane,
 }
 
 impl TileRanges {
     fn empty() -> Self {
-        let plane = || vec![EMPTY; TILES * TILES];
+        let plane = || Box::new([EMPTY; TILES * TILES]);
         Self { min: plane(), max: plane(), near_max: plane() }
     }
 
     fn clear(&mut self) {
         [&mut self.min, &mut self.max, &mut self.near_max].into_iter().for_each(|plane| plane.fill(EMPTY));
-    }
-
-    /// The range around a point of tile `index` that is `own` above level ground.
-    fn around(&self, index: usize, own: f32) -> HeightRange {
-        let [min, max, near_max] = [&self.min, &self.max, &self.near_max].map(|plane| plane[index] - own);
-        HeightRange { min, max, near_max }
     }
 }
 
@@ -123,7 +112,7 @@ pub(crate) struct ShadowMap {
     ranges: TileRanges,
 }
 
-/// Eight points in the frame of a shadow map.
+/// Eight points in the frame of a shadow map, which all maps of one [`Lighting`] and one radius share.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct LightSpacePoints {
     /// Column in the map, texels.
@@ -134,6 +123,10 @@ pub(crate) struct LightSpacePoints {
     pub(crate) height: f32x8,
     /// Height above level ground, m.
     pub(crate) height_above_ground: f32x8,
+    /// Mask of the points that lie within the map.
+    pub(super) is_inside: f32x8,
+    /// The tile of each point, or one at the border of the map.
+    tiles: [usize; LANES],
 }
 
 impl ShadowMap {
@@ -207,7 +200,18 @@ impl ShadowMap {
         let v = d.dot(Vec3x8::splat(&self.axes[1])) * scale + middle;
         let height = d.dot(Vec3x8::splat(&self.axes[2]));
         let ground = u * f32x8::splat(self.ground_slope[0]) + v * f32x8::splat(self.ground_slope[1]);
-        LightSpacePoints { u, v, height, height_above_ground: height - ground }
+        let (low, high) = (f32x8::splat(MARGIN as f32), f32x8::splat((MARGIN + INNER) as f32));
+        let last = f32x8::splat((EDGE - 1) as f32);
+        let tile = |x: f32x8| x.fast_max(f32x8::ZERO).fast_min(last).fast_trunc_int() >> TILE_BITS;
+        let tiles = (tile(v) * i32x8::splat(TILES as i32) + tile(u)).to_array();
+        LightSpacePoints {
+            u,
+            v,
+            height,
+            height_above_ground: height - ground,
+            is_inside: u.simd_ge(low) & v.simd_ge(low) & u.simd_lt(high) & v.simd_lt(high),
+            tiles: tiles.map(|i| (i as usize).min(TILES * TILES - 1)),
+        }
     }
 
     /// Computes the ranges of heights.
@@ -241,9 +245,9 @@ impl ShadowMap {
             }
         }
         let rows = (from / TILE).saturating_sub(MARGIN_TILES)..(to.div_ceil(TILE) + MARGIN_TILES).min(TILES);
-        dilate::<MARGIN_TILES>(&lowest, rows.clone(), lower, &mut self.ranges.min);
-        dilate::<MARGIN_TILES>(&highest, rows.clone(), higher, &mut self.ranges.max);
-        dilate::<1>(&highest, rows, higher, &mut self.ranges.near_max);
+        dilate::<MARGIN_TILES>(&lowest, rows.clone(), lower, &mut *self.ranges.min);
+        dilate::<MARGIN_TILES>(&highest, rows.clone(), higher, &mut *self.ranges.max);
+        dilate::<1>(&highest, rows, higher, &mut *self.ranges.near_max);
     }
 
     /// True if a shadow may fall within a box in the frame of the map: lowest and highest u, v (texels) and height
@@ -257,75 +261,26 @@ impl ShadowMap {
         })
     }
 
-    /// Mask of the points that lie within the map.
-    #[inline(always)]
-    pub(crate) fn contains(&self, at: &LightSpacePoints) -> f32x8 {
-        let (low, high) = (f32x8::splat(MARGIN as f32), f32x8::splat((MARGIN + INNER) as f32));
-        at.u.simd_ge(low) & at.v.simd_ge(low) & at.u.simd_lt(high) & at.v.simd_lt(high)
-    }
-
-    /// Visible fraction of the light at points of normals `n`; 1 where `mask` is clear or the map does not reach.
+    /// Visible fraction of the light at points of normals `n`, given in the frame of this map; 1 where `mask` is clear or
+    /// the map does not reach.
     #[inline(always)]
     pub(crate) fn visibility(&self, at: &LightSpacePoints, n: &Vec3x8, mask: f32x8) -> f32x8 {
-        let inside = (self.contains(at) & mask).to_bitmask();
+        let inside = (at.is_inside & mask).to_bitmask();
         let [first, last] = self.texels.drawn_rows;
         if inside == 0 || first >= last {
             return f32x8::ONE;
         }
-        let tile = |x: f32x8| {
-            (x.fast_max(f32x8::ZERO).fast_min(f32x8::splat((EDGE - 1) as f32))).fast_trunc_int() >> TILE_BITS
-        };
-        let tiles = (tile(at.v) * i32x8::splat(TILES as i32) + tile(at.u)).to_array();
-        let tiles = tiles.map(|i| (i as usize).min(TILES * TILES - 1));
-        let max = f32x8::new(tiles.map(|i| self.ranges.max[i]));
+        let max = f32x8::new(at.tiles.map(|i| self.ranges.max[i]));
         let occluded = max.simd_gt(at.height_above_ground + f32x8::splat(DEPTH_BIAS)).to_bitmask() & inside;
-        if occluded == 0 { f32x8::ONE } else { self.filtered_visibility(at, n, occluded, &tiles) }
+        if occluded == 0 { f32x8::ONE } else { self.filtered_visibility(at, n, occluded) }
     }
 
-    /// Visible fractions at the points of the bit mask `occluded`, which have something higher around their `tiles`.
+    /// Visible fractions at the points of the bit mask `occluded`, which have something higher around their tiles.
     #[inline(never)]
-    fn filtered_visibility(
-        &self,
-        at: &LightSpacePoints,
-        n: &Vec3x8,
-        occluded: u32,
-        tiles: &[usize; LANES],
-    ) -> f32x8 {
-        let component = |axis: usize| n.dot(Vec3x8::splat(&self.axes[axis]));
-        let inverse_cosine = f32x8::ONE / component(2).fast_max(f32x8::splat(MIN_COSINE));
-        let texel = f32x8::splat(1.0 / self.texels_per_metre);
-        let slope = [0, 1].map(|axis| -component(axis) * inverse_cosine * texel);
-        let max_slope = f32x8::splat(MAX_RECEIVER_SLOPE) * texel;
-        let normal_bias =
-            f32x8::splat(MIN_RADIUS * MAX_NORMAL_ERROR) * texel * inverse_cosine * inverse_cosine;
-        let bias = (f32x8::splat(DEPTH_BIAS) * inverse_cosine + normal_bias).to_array();
-        let clamped_slope = slope.map(|s| s.fast_max(-max_slope).fast_min(max_slope).to_array());
-        let position = [at.u, at.v, at.height].map(f32x8::to_array);
-        let slopes = slope.map(f32x8::to_array);
-        let own_height = at.height_above_ground.to_array();
-        let filter = |i: usize| {
-            let receiver = PenumbraFilter {
-                map: self,
-                position: position.map(|x| x[i]),
-                slope: slopes.map(|slope| slope[i]),
-                clamped_slope: clamped_slope.map(|slope| slope[i]),
-                bias: bias[i],
-                cone: self.tangent * self.texels_per_metre,
-            };
-            receiver.light(self.ranges.around(tiles[i], own_height[i]))
-        };
-        // Distances of the points from point `i`, texels; infinite for those that are not on one smooth surface with
-        // it.
-        let distances = |i: usize| -> f32x8 {
-            let from = |x: f32x8| x - f32x8::splat(x.to_array()[i]);
-            let (du, dv) = (from(at.u), from(at.v));
-            let rise = du * f32x8::splat(slopes[0][i]) + dv * f32x8::splat(slopes[1][i]);
-            let own_normal = n.to_arrays().map(|axis| f32x8::splat(axis[i]));
-            let own_normal = Vec3x8 { x: own_normal[0], y: own_normal[1], z: own_normal[2] };
-            let is_smooth = (from(at.height) - rise).abs().simd_lt(f32x8::splat(MAX_PLANE_DISTANCE))
-                & n.dot(own_normal).simd_gt(f32x8::splat(MIN_NEIGHBOUR_COSINE));
-            is_smooth.select(du.abs().fast_max(dv.abs()), f32x8::splat(f32::INFINITY))
-        };
+    fn filtered_visibility(&self, at: &LightSpacePoints, n: &Vec3x8, occluded: u32) -> f32x8 {
+        let receivers = Receivers::new(self, at, n);
+        let distances = |i: usize| receivers.distances(at, n, i);
+        let filter = |i: usize| receivers.light(i);
         let mut points = PointSequence { occluded, distances, filter, light: [FilteredLight::LIT; LANES] };
         points.evaluate(0);
         points.evaluate(LANES - 1);
@@ -440,20 +395,29 @@ fn dilate<const REACH: usize>(
     }
 }
 
-/// Percentage-closer filter around one receiver.
+/// Percentage-closer filters around eight receivers.
 ///
 /// Only occluders within the cone of the lamp count: an offset to the side larger than height × lamp width is
 /// ignored, so a surface that rises next to the point does not darken it.
-struct PenumbraFilter<'a> {
+struct Receivers<'a> {
     map: &'a ShadowMap,
+    tiles: &'a [usize; LANES],
     /// u and v, texels, and height, m.
-    position: [f32; 3],
+    position: [[f32; LANES]; 3],
+    /// Height above level ground, m.
+    height_above_ground: [f32; LANES],
+    normal: [[f32; LANES]; 3],
     /// Rise of the receiver's plane per texel along u and v, m.
-    slope: [f32; 2],
+    slope: [[f32; LANES]; 2],
     /// The slope clamped to [`MAX_RECEIVER_SLOPE`], from which heights of occluders are measured.
-    clamped_slope: [f32; 2],
-    /// Heights above the plane up to this are the receiver itself, m.
-    bias: f32,
+    clamped_slope: [[f32; LANES]; 2],
+    /// Texels higher than this by more than the rise of the receiver's plane occlude, m; lower ones are the receiver
+    /// itself.
+    limit: [f32; LANES],
+    /// Height above level ground, m, from which all texels around a receiver leave it dark.
+    dark_height: [f32; LANES],
+    /// Radius that the search for occluders on level ground would have before it is clamped, texels.
+    ground_radius: [f32; LANES],
     /// Radius of the lamp's cone per metre of height, texels.
     cone: f32,
 }
@@ -468,28 +432,69 @@ struct Occluders {
     is_partial: bool,
 }
 
-impl PenumbraFilter<'_> {
-    /// The light that passes; `range` are the heights around the point.
-    fn light(&self, range: HeightRange) -> FilteredLight {
-        let both_axes = |of: fn(&Self, usize) -> f32| of(self, 0) + of(self, 1);
-        let steepest = both_axes(|f, axis| f.slope[axis].abs() + f.map.ground_slope[axis].abs());
-        if range.min > self.bias + steepest * MAX_RADIUS {
+impl<'a> Receivers<'a> {
+    #[inline(always)]
+    fn new(map: &'a ShadowMap, at: &'a LightSpacePoints, n: &Vec3x8) -> Self {
+        let component = |axis: usize| n.dot(Vec3x8::splat(&map.axes[axis]));
+        let inverse_cosine = f32x8::ONE / component(2).fast_max(f32x8::splat(MIN_COSINE));
+        let texel = f32x8::splat(1.0 / map.texels_per_metre);
+        let slope = [0, 1].map(|axis| -component(axis) * inverse_cosine * texel);
+        let max_slope = f32x8::splat(MAX_RECEIVER_SLOPE) * texel;
+        let clamped_slope = slope.map(|s| s.fast_max(-max_slope).fast_min(max_slope));
+        let normal_bias =
+            f32x8::splat(MIN_RADIUS * MAX_NORMAL_ERROR) * texel * inverse_cosine * inverse_cosine;
+        let bias = f32x8::splat(DEPTH_BIAS) * inverse_cosine + normal_bias;
+        let (own, reach) = (at.height_above_ground, f32x8::splat(MAX_RADIUS));
+        let ground_slope = map.ground_slope.map(f32x8::splat);
+        let steepest = slope[0].abs() + slope[1].abs() + (ground_slope[0].abs() + ground_slope[1].abs());
+        let deviation =
+            (ground_slope[0] - clamped_slope[0]).abs() + (ground_slope[1] - clamped_slope[1]).abs();
+        let cone = map.tangent * map.texels_per_metre;
+        let ground_radius = f32x8::splat(MIN_RADIUS) + (deviation * reach - own) * f32x8::splat(cone);
+        Self {
+            map,
+            tiles: &at.tiles,
+            position: [at.u, at.v, at.height].map(f32x8::to_array),
+            height_above_ground: own.to_array(),
+            normal: n.to_arrays(),
+            slope: slope.map(f32x8::to_array),
+            clamped_slope: clamped_slope.map(f32x8::to_array),
+            limit: (at.height + bias).to_array(),
+            dark_height: (own + bias + steepest * reach).to_array(),
+            ground_radius: ground_radius.to_array(),
+            cone,
+        }
+    }
+
+    /// Distances of all points from point `i`, texels; infinite for those that are not on one smooth surface with it.
+    fn distances(&self, at: &LightSpacePoints, n: &Vec3x8, i: usize) -> f32x8 {
+        let [u, v, height] = self.position.each_ref().map(|lanes| f32x8::splat(lanes[i]));
+        let (du, dv) = (at.u - u, at.v - v);
+        let rise = du * f32x8::splat(self.slope[0][i]) + dv * f32x8::splat(self.slope[1][i]);
+        let [x, y, z] = self.normal.each_ref().map(|lanes| f32x8::splat(lanes[i]));
+        let is_smooth = (at.height - height - rise).abs().simd_lt(f32x8::splat(MAX_PLANE_DISTANCE))
+            & n.dot(Vec3x8 { x, y, z }).simd_gt(f32x8::splat(MIN_NEIGHBOUR_COSINE));
+        is_smooth.select(du.abs().fast_max(dv.abs()), f32x8::splat(f32::INFINITY))
+    }
+
+    /// The light that passes to receiver `i`.
+    fn light(&self, i: usize) -> FilteredLight {
+        let (ranges, tile) = (&self.map.ranges, self.tiles[i]);
+        if ranges.min[tile] > self.dark_height[i] {
             return FilteredLight::DARK;
         }
-        let deviation = both_axes(|f, axis| (f.map.ground_slope[axis] - f.clamped_slope[axis]).abs());
-        let radius_below = |height: f32| {
-            (MIN_RADIUS + (height + deviation * MAX_RADIUS) * self.cone).clamp(MIN_RADIUS, MAX_RADIUS)
-        };
-        let mut search_radius = radius_below(range.max);
+        let radius_below =
+            |height: f32| (self.ground_radius[i] + height * self.cone).clamp(MIN_RADIUS, MAX_RADIUS);
+        let mut search_radius = radius_below(ranges.max[tile]);
         if search_radius <= NEAR_RADIUS {
-            if range.near_max <= DEPTH_BIAS {
+            if ranges.near_max[tile] <= self.height_above_ground[i] + DEPTH_BIAS {
                 return FilteredLight::LIT;
             }
-            search_radius = radius_below(range.near_max);
+            search_radius = radius_below(ranges.near_max[tile]);
         }
         let occluders = match search_radius {
-            ..=MAX_FINE_RADIUS => self.occluders::<1>(search_radius),
-            _ => self.occluders::<COARSE>(search_radius),
+            ..=MAX_FINE_RADIUS => self.occluders::<1>(i, search_radius),
+            _ => self.occluders::<COARSE>(i, search_radius),
         };
         if occluders.weight <= 0.0 {
             return FilteredLight::LIT;
@@ -500,56 +505,55 @@ impl PenumbraFilter<'_> {
         let mean_height = occluders.weighted_height / occluders.weight;
         let radius = (mean_height * self.cone).clamp(MIN_RADIUS, search_radius);
         let visible = match radius {
-            ..=MAX_FINE_RADIUS => self.lit_share::<1>(radius),
-            _ => self.lit_share::<COARSE>(radius),
+            ..=MAX_FINE_RADIUS => self.lit_share::<1>(i, radius),
+            _ => self.lit_share::<COARSE>(i, radius),
         };
         FilteredLight { visible, radius }
     }
 
-    /// Occluders in a square of half-width `radius`, texels, of which every `STEP`th row and column is read.
+    /// Occluders in a square of half-width `radius`, texels, around receiver `i`, of which every `STEP`th row and column
+    /// is read.
     ///
     /// They are weighed by the lamp's cone alone, so that the result does not depend on the radius.
     #[inline(always)]
-    fn occluders<const STEP: usize>(&self, radius: f32) -> Occluders {
-        let window = FilterWindow::<STEP>::new(self, radius);
+    fn occluders<const STEP: usize>(&self, i: usize, radius: f32) -> Occluders {
+        let window = FilterWindow::<STEP>::new(self, i, radius);
+        // Most windows are clear: this finds those in fewer instructions.
+        if window.is_clear() {
+            return Occluders { weight: 0.0, weighted_height: 0.0, is_partial: true };
+        }
         let in_range = window.du.abs().simd_lt(f32x8::splat(radius)).to_bitmask();
         let (mut weight, mut weighted_height) = (f32x8::ZERO, f32x8::ZERO);
-        let (mut is_partial, mut has_occluders) = (false, false);
-        window.for_each_row(self, radius, |dv, heights| {
-            let is_higher = window.is_higher(self, heights, dv);
-            let higher = is_higher.to_bitmask();
-            is_partial |= in_range & !higher != 0;
-            if higher != 0 {
-                has_occluders = true;
-                let [rise, within] = window.occlusion(self, heights, dv, radius);
-                let within = is_higher & within;
-                weight += within;
-                weighted_height += within * rise;
-            }
+        let mut is_partial = false;
+        window.for_each_row(radius, |dv, heights| {
+            let is_higher = window.is_higher(heights, dv);
+            is_partial |= in_range & !is_higher.to_bitmask() != 0;
+            let [rise, within] = window.occlusion(heights, dv, radius);
+            let within = is_higher & within;
+            weight += within;
+            weighted_height += within * rise;
         });
-        if !has_occluders {
-            return Occluders { weight: 0.0, weighted_height: 0.0, is_partial };
-        }
         Occluders { weight: sum_lanes(weight), weighted_height: sum_lanes(weighted_height), is_partial }
     }
 
-    /// Share of the light that passes, by a filter of `radius` texels that reads every `STEP`th row and column.
+    /// Share of the light that passes to receiver `i`, by a filter of `radius` texels that reads every `STEP`th row and
+    /// column.
     #[inline(always)]
-    fn lit_share<const STEP: usize>(&self, radius: f32) -> f32 {
-        let window = FilterWindow::<STEP>::new(self, radius);
+    fn lit_share<const STEP: usize>(&self, i: usize, radius: f32) -> f32 {
+        let window = FilterWindow::<STEP>::new(self, i, radius);
         let inverse2 = 1.0 / (radius * radius);
         // The product of two parabolas: smoother than a box, and separable.
         let weights = (f32x8::ONE - window.du * window.du * f32x8::splat(inverse2)).fast_max(f32x8::ZERO);
         let (mut lit, mut occluded) = (f32x8::ZERO, f32x8::ZERO);
-        window.for_each_row(self, radius, |dv, heights| {
+        window.for_each_row(radius, |dv, heights| {
             let weight = weights * f32x8::splat(1.0 - dv * dv * inverse2);
-            let is_higher = window.is_higher(self, heights, dv);
+            let is_higher = window.is_higher(heights, dv);
             if !is_higher.any() {
                 lit += weight;
                 return;
             }
             lit += weight & !is_higher;
-            let [_, within] = window.occlusion(self, heights, dv, f32::MAX);
+            let [_, within] = window.occlusion(heights, dv, f32::MAX);
             occluded += weight * (is_higher & within);
         });
         let (lit, occluded) = (sum_lanes(lit), sum_lanes(occluded));
@@ -557,67 +561,99 @@ impl PenumbraFilter<'_> {
     }
 }
 
-/// The texels around a receiver: eight columns, of which every `STEP`th of the map is read, as of the rows.
-struct FilterWindow<const STEP: usize> {
-    /// First column and row, in steps.
-    first: [usize; 2],
+/// The texels around a receiver: eight columns, of which every `STEP`th of the map is read, and up to eight such rows.
+struct FilterWindow<'a, const STEP: usize> {
     /// Columns relative to the receiver, texels.
     du: f32x8,
+    /// The first row relative to the receiver, texels.
+    first_dv: f32,
+    /// Heights from the first column and row on.
+    heights: &'a [f32],
     /// Rise of the receiver's plane from the receiver to the columns, m.
     plane_rise: f32x8,
+    /// Its rise per texel along v, m.
+    slope_v: f32,
     /// Heights that exceed this by more than the rise of the plane occlude, m.
     limit: f32x8,
+    /// Height of the clamped plane in the columns, m.
+    clamped_height: f32x8,
+    /// Its rise per texel along v, m.
+    clamped_slope_v: f32,
+    /// As in [`Receivers`].
+    cone: f32,
 }
 
-impl<const STEP: usize> FilterWindow<STEP> {
+impl<'a, const STEP: usize> FilterWindow<'a, STEP> {
+    /// Length of a row of the texels in memory.
+    const STRIDE: usize = if STEP == COARSE { COARSE_EDGE } else { STRIDE };
+
     #[inline(always)]
-    fn new(receiver: &PenumbraFilter, radius: f32) -> Self {
-        let [u, v, height] = receiver.position;
-        // The first texel read at most `radius` before the receiver. Conversions by way of `i32` take fewer
-        // instructions.
-        let first = [u, v].map(|x| ((x - radius - 0.5) * (1.0 / STEP as f32) + 1.0) as i32 as usize);
-        let du = LANE_INDEX * f32x8::splat(STEP as f32) + f32x8::splat((first[0] * STEP) as f32 + 0.5 - u);
+    fn new(receivers: &Receivers<'a>, i: usize, radius: f32) -> Self {
+        let map = receivers.map;
+        let [u, v, height] = receivers.position.each_ref().map(|lanes| lanes[i]);
+        // The first texel read at most `radius` before the receiver. Vectors convert without the checks that scalars do.
+        let before = f32x4::new([u, v, 0.0, 0.0]) - f32x4::splat(radius + 0.5);
+        let first = (before * f32x4::splat(1.0 / STEP as f32) + f32x4::ONE).fast_trunc_int();
+        let [first_u, first_v, ..] =
+            (f32x4::from_i32x4(first) * f32x4::splat(STEP as f32) + f32x4::splat(0.5)).to_array();
+        let [column, row, ..] = first.to_array();
+        let texels = if STEP == COARSE { &map.coarse } else { &map.texels.heights };
+        let du = LANE_INDEX * f32x8::splat(STEP as f32) + f32x8::splat(first_u - u);
+        let [slope_u, slope_v] = receivers.slope.each_ref().map(|lanes| lanes[i]);
+        let [clamped_slope_u, clamped_slope_v] = receivers.clamped_slope.each_ref().map(|lanes| lanes[i]);
         Self {
-            first,
             du,
-            plane_rise: du * f32x8::splat(receiver.slope[0]),
-            limit: f32x8::splat(height + receiver.bias),
+            first_dv: first_v - v,
+            heights: texels.get(row as usize * Self::STRIDE + column as usize..).unwrap_or_default(),
+            plane_rise: du * f32x8::splat(slope_u),
+            slope_v,
+            limit: f32x8::splat(receivers.limit[i]),
+            clamped_height: du * f32x8::splat(clamped_slope_u) + f32x8::splat(height),
+            clamped_slope_v,
+            cone: receivers.cone,
         }
+    }
+
+    /// True if nothing in eight rows occludes.
+    #[inline(always)]
+    fn is_clear(&self) -> bool {
+        let Some(texels) = self.heights.get(..(LANES - 1) * Self::STRIDE + LANES) else { return false };
+        let (mut dv, mut is_higher) = (self.first_dv, f32x8::ZERO);
+        for row in 0..LANES {
+            let Some(heights) = texels[row * Self::STRIDE..].first_chunk() else { return false };
+            is_higher |= self.is_higher(f32x8::new(*heights), dv);
+            dv += STEP as f32;
+        }
+        !is_higher.any()
     }
 
     /// Calls `add` with the distance from the receiver, texels, and the heights of every row within `radius`.
     #[inline(always)]
-    fn for_each_row(&self, receiver: &PenumbraFilter, radius: f32, mut add: impl FnMut(f32, f32x8)) {
-        let (heights, stride) = match STEP {
-            COARSE => (&receiver.map.coarse, COARSE_EDGE),
-            _ => (&receiver.map.texels.heights, STRIDE),
-        };
-        let mut left = heights.get(self.first[1] * stride + self.first[0]..).unwrap_or_default();
-        let mut dv = (self.first[1] * STEP) as f32 + 0.5 - receiver.position[1];
+    fn for_each_row(&self, radius: f32, mut add: impl FnMut(f32, f32x8)) {
+        let (mut left, mut dv) = (self.heights, self.first_dv);
         // A counter of rows and ranges of texels in place of iterators, which take as long as the sums.
         while dv < radius {
             let Some(texels) = left.first_chunk() else { break };
             add(dv, f32x8::new(*texels));
             dv += STEP as f32;
-            left = left.get(stride..).unwrap_or_default();
+            left = left.get(Self::STRIDE..).unwrap_or_default();
         }
     }
 
     /// Mask of the heights in a row that occlude.
     #[inline(always)]
-    fn is_higher(&self, of: &PenumbraFilter, heights: f32x8, dv: f32) -> f32x8 {
-        let rise = self.plane_rise + f32x8::splat(of.slope[1] * dv);
+    fn is_higher(&self, heights: f32x8, dv: f32) -> f32x8 {
+        let rise = self.plane_rise + f32x8::splat(self.slope_v * dv);
         heights.simd_gt(self.limit + rise.fast_max(f32x8::ZERO))
     }
 
     /// Heights above the receiver's clamped plane, and the share of each within the lamp's cone, of a radius of at most
     /// `max_reach` texels.
     #[inline(always)]
-    fn occlusion(&self, of: &PenumbraFilter, heights: f32x8, dv: f32, max_reach: f32) -> [f32x8; 2] {
-        let column_height = self.du * f32x8::splat(of.clamped_slope[0]) + f32x8::splat(of.position[2]);
-        let rise = heights - column_height - f32x8::splat(of.clamped_slope[1] * dv);
+    fn occlusion(&self, heights: f32x8, dv: f32, max_reach: f32) -> [f32x8; 2] {
+        let rise = heights - self.clamped_height - f32x8::splat(self.clamped_slope_v * dv);
         let reach =
-            (rise * f32x8::splat(of.cone) + f32x8::splat(MIN_RADIUS)).fast_min(f32x8::splat(max_reach));
+            (rise * f32x8::splat(self.cone) + f32x8::splat(MIN_RADIUS)).fast_min(f32x8::splat(max_reach));
         // Full weight inside the cone, which fades out towards its border.
         let within = (reach * reach - self.du * self.du - f32x8::splat(dv * dv))
             * f32x8::splat(1.0 / (MIN_RADIUS * MIN_RADIUS));
