@@ -76,7 +76,7 @@ pub struct SensorAssets {
     disk: DiskCache,
 }
 
-/// Maximum number of skins, of some 20 MB each: in suites whose objects vary, no episode needs those of another.
+/// Maximum number of skins, of some 7 MB each: in suites whose objects vary, no episode needs those of another.
 /// Episodes keep their own.
 const MAX_SKINS: usize = 8;
 

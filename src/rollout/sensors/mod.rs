@@ -34,8 +34,8 @@ use softvt_sensing::{
         check_light,
     },
     tactile::{
-        GelScratch, PadWrench, SkinMesh, SubstrateCompliance, TactileContact, TactileReading, TactileSkin,
-        Taxels, patch_friction,
+        GelScratch, PadWrench, PlacedSkin, SkinMesh, SubstrateCompliance, TactileContact, TactileReading,
+        TactileSkin, Taxels, patch_friction,
     },
 };
 
@@ -346,8 +346,8 @@ impl Sensors {
         let patch = frame.patches.get(index).filter(|patch| patch.points.iter().any(|p| inside(&p.p_p)));
         let patch = patch.unwrap_or(&none);
         let pad_w = self.pads_w(frame)[index];
-        let mut placed: Vec<(Arc<TactileSkin>, Vec<Vec3>)> = Vec::new();
-        let mut substrate = None;
+        let w_p = pad_w.inverse();
+        let (mut touching, mut substrate) = (Vec::new(), None);
         for (index, object) in
             self.objects.iter().enumerate().filter(|(_, object)| is_in_contact(object, patch))
         {
@@ -358,22 +358,20 @@ impl Sensors {
                     self.skins[index].insert(self.assets.skin(&object.name, &object.asset, mesh)?).clone()
                 }
             };
-            let mut vertices = Vec::new();
-            let w_p = pad_w.inverse();
-            match object.body {
-                BodyId::Soft(body) => skin.place_soft(frame.soft(body), &w_p, &mut vertices),
-                BodyId::Rigid(body) => skin.place_rigid(&(w_p * frame.rigid(body)), &mut vertices),
-                BodyId::Link(link) => skin
-                    .place_rigid(&(w_p * frame.link(link) * object.joint_frame_o().inverse()), &mut vertices),
-                BodyId::World | BodyId::Kinematic(_) => {
-                    skin.place_rigid(&(w_p * object.start_w), &mut vertices)
-                }
-            }
-            placed.push((skin, vertices));
+            touching.push((object, skin));
             substrate = substrate_of(object);
         }
-        let skins: Vec<SkinMesh> =
-            placed.iter().map(|(skin, vertices)| SkinMesh { vertices, triangles: &skin.triangles }).collect();
+        let placed =
+            touching.iter().map(|(object, skin): &(&ObjectInstance, Arc<TactileSkin>)| match object.body {
+                BodyId::Soft(body) => skin.place_soft(frame.soft(body), &w_p),
+                BodyId::Rigid(body) => skin.place_rigid(&(w_p * frame.rigid(body))),
+                BodyId::Link(link) => {
+                    skin.place_rigid(&(w_p * frame.link(link) * object.joint_frame_o().inverse()))
+                }
+                BodyId::World | BodyId::Kinematic(_) => skin.place_rigid(&(w_p * object.start_w)),
+            });
+        let placed: Vec<PlacedSkin> = placed.collect();
+        let skins: Vec<SkinMesh> = placed.iter().map(PlacedSkin::mesh).collect();
         let contact = TactileContact {
             wrench: PadWrench::from_patch(patch),
             skins: &skins,

@@ -28,5 +28,5 @@ pub use self::{
     },
     markers::{MARKER_COUNT, MarkerFlow, MarkerPositions, MarkerStyle, Markers},
     sensor::{TactileReading, TactileSensor, TactileSensorError},
-    skin::TactileSkin,
+    skin::{PlacedSkin, TactileSkin},
 };

@@ -118,7 +118,7 @@ impl TactileSensor {
         Ok(Self { gel, untouched_image, optics, markers: spec.markers })
     }
 
-    /// Reading of a contact. `scratch` saves allocations and does not influence the result.
+    /// Reading of a contact. `scratch` saves time and does not influence the result.
     ///
     /// # Errors
     /// A number of the contact is not finite, or a force presses but no skin is given.

@@ -1,8 +1,10 @@
 //! The gel: grid over the pad and response of its surface to tractions, computed once for all fingers and frames.
 
+use std::sync::Arc;
+
 use nalgebra::Vector2;
 
-use super::{elastic_layer::LayerResponse, height_map::FINE};
+use super::{elastic_layer::LayerResponse, height_map::FINE, substrate::SubstrateCompliance};
 use softvt_common::range::RangeError;
 use softvt_robot::PadSurface;
 use softvt_robot::tactile::{GelSpec, OpticsModel, Pinhole, TactileSpec};
@@ -31,7 +33,7 @@ pub struct Gel {
     /// Height of the undeformed surface at each cell, m, pad frame; NaN outside the outline.
     pub(in super::super) dome: Vec<f32>,
     pub(super) fft: PaddedFft,
-    pub(super) kernels: LayerKernels,
+    pub(super) kernels: Arc<LayerKernels>,
 }
 
 /// Spectra of the layer's response, m/Pa, divided by the size of the transform.
@@ -47,13 +49,15 @@ pub(super) struct LayerKernels {
     pub(super) k: Vec<f32>,
 }
 
-/// Intermediate results of one thread; may serve any gel and finger in any order.
+/// Working memory of one thread, and the compliance of the last gel and body; may serve any gel and finger in any order.
 #[derive(Clone, Debug, Default)]
 pub struct GelScratch {
     pub(super) spectra: [Vec<Complex32>; 4],
     pub(super) buffers: FftBuffers,
     /// Spectrum of the compliance of gel and body in series.
     pub(super) compliance: Vec<f32>,
+    /// What this spectrum is made of.
+    compliance_of: Option<(Arc<LayerKernels>, Option<SubstrateCompliance>)>,
     /// Size of the transform for which the buffers are allocated.
     pub(super) size: [usize; 2],
 }
@@ -71,7 +75,7 @@ impl Gel {
         // Periodic images of a contact act on each other only across the full width of the pad: there, one and a half
         // thicknesses away, a load moves the surface by less than 2 % of its displacement under the load.
         let fft = PaddedFft::new(columns, rows, (1.5 * pad.thickness / cell).ceil() as usize);
-        let kernels = LayerKernels::new(&fft, &spec.gel, pad.thickness);
+        let kernels = Arc::new(LayerKernels::new(&fft, &spec.gel, pad.thickness));
         // Taxim shows the skins themselves; other optics show the surface of the gel, which presses details of soft
         // skins flat.
         let soft_skin_points = if matches!(spec.optics, OpticsModel::Taxim { .. }) { FINE } else { 1 };
@@ -141,5 +145,19 @@ impl GelScratch {
             self.buffers = gel.fft.buffers();
             self.size = size;
         }
+    }
+
+    /// Computes the compliance of `gel` and of a body in series with it, unless it is known.
+    pub(super) fn set_compliance(&mut self, gel: &Gel, body: Option<SubstrateCompliance>) {
+        let is_known =
+            |(kernels, of): &(Arc<LayerKernels>, _)| Arc::ptr_eq(kernels, &gel.kernels) && *of == body;
+        if self.compliance_of.as_ref().is_some_and(is_known) {
+            return;
+        }
+        self.compliance.clone_from(&gel.kernels.normal);
+        if let Some(body) = body {
+            body.add_to(&mut self.compliance, &gel.kernels.k, gel.fft.width * gel.fft.height);
+        }
+        self.compliance_of = Some((gel.kernels.clone(), body));
     }
 }

@@ -7,6 +7,7 @@ use super::{
     height_map::{FINE, HeightMap, SkinMesh},
     normal_contact::solve_normal_contact,
     pad_wrench::{PadWrench, Taxels},
+    substrate::SubstrateCompliance,
     tangential_contact::{PlanarMotion, apply_shear_kernel, solve_tangential_contact, spring_stiffness},
 };
 use softvt_geometry::{Mat3, Vec3};
@@ -24,16 +25,6 @@ pub struct TactileContact<'a> {
     /// Compliance of the touching body in series with the gel; `None` presses its surface in unchanged,
     /// like a rigid stamp.
     pub substrate: Option<SubstrateCompliance>,
-}
-
-/// Compliance of a soft body in waves too short for its finite elements: an elastic half space for waves shorter than
-/// `resolved`. Longer waves are in the deformed surface already. (Johnson, *Contact Mechanics*, 1985, §4.2.)
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct SubstrateCompliance {
-    /// Plane-strain modulus E/(1 − ν²) of the body, Pa.
-    pub modulus: f64,
-    /// Shortest wavelength that the body's mesh resolves, m.
-    pub resolved: f64,
 }
 
 /// Gel under a contact; arrays are over the cells of [`Gel`], row by row.
@@ -72,8 +63,8 @@ impl GelField {
     /// Solves a contact; `None` if nothing presses, or only outside the grid.
     ///
     /// The skins are pressed in until the pressure carries the normal force of the wrench; then the shear is
-    /// found that carries its tangential force and twist. Nothing is kept from one call to the next:
-    /// `scratch` only saves allocations.
+    /// found that carries its tangential force and twist. The result does not depend on earlier calls:
+    /// `scratch` keeps working memory, and the compliance of the last gel and body.
     ///
     /// # Errors
     /// A number is not finite, or there is a pressing force but no skin.
@@ -88,10 +79,7 @@ impl GelField {
             return Ok(None);
         }
         scratch.fit(gel);
-        scratch.compliance.clone_from(&gel.kernels.normal);
-        if let Some(body) = substrate {
-            body.add_to(gel, &mut scratch.compliance);
-        }
+        scratch.set_compliance(gel, *substrate);
         let points_per_cell = if substrate.is_some() { gel.soft_skin_points } else { FINE };
         let mut height_map = HeightMap::new(gel, skins, points_per_cell);
         if skins.is_empty() {
@@ -219,19 +207,6 @@ fn validate(contact: &TactileContact) -> Result<(), TactileContactError> {
         }
     }
     Ok(())
-}
-
-impl SubstrateCompliance {
-    /// Adds the compliance of the body, in series, to that of the gel.
-    fn add_to(&self, gel: &Gel, compliance: &mut [f32]) {
-        let size = (gel.fft.width * gel.fft.height) as f64;
-        let resolved_k = std::f64::consts::TAU / self.resolved;
-        for (total, &k) in compliance.iter_mut().zip(&gel.kernels.k) {
-            let k = f64::from(k).max(1e-3);
-            let unresolved = 1.0 - (-(k / resolved_k).powi(2)).exp();
-            *total += (2.0 * unresolved / (self.modulus * k) / size) as f32;
-        }
-    }
 }
 
 /// Displacement of the gel's surface by pressure and shear, m.

@@ -10,13 +10,15 @@ mod gel_field;
 mod height_map;
 mod normal_contact;
 mod pad_wrench;
+mod substrate;
 mod tangential_contact;
 #[cfg(test)]
 pub(super) mod tests;
 
 pub use gel::{Gel, GelScratch};
 pub(super) use gel_field::cubic_taps;
-pub use gel_field::{GelField, SubstrateCompliance, TactileContact, TactileContactError};
+pub use gel_field::{GelField, TactileContact, TactileContactError};
 pub use height_map::SkinMesh;
 pub use pad_wrench::{PadWrench, Taxels, patch_friction};
+pub use substrate::SubstrateCompliance;
 pub use tangential_contact::PlanarMotion;

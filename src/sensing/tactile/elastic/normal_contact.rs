@@ -34,35 +34,30 @@ pub(super) fn solve_normal_contact(
     let (mut residual, mut direction, mut moved) = (vec![0.0_f32; n], vec![0.0_f32; n], vec![0.0_f32; n]);
     let mut sunk = vec![0.0_f32; n];
     apply_compliance(gel, &p, &mut sunk, scratch);
+    let mut touching = touching_cells(&p);
     // `conjugate` is 1 if the next direction may be conjugate to the last one, and 0 if the
     // touching cells have changed.
     let (mut before, mut conjugate, mut approach) = (1.0_f64, 0.0_f32, 0.0);
     for _ in 0..MAX_ITERATIONS {
-        let depth = mean_of_touching(&p, sunk.iter().zip(gap).map(|(u, g)| u + g));
+        let depth = mean_over(&touching, |c| sunk[c] + gap[c]);
         approach = f64::from(depth);
         let mut now = 0.0_f64;
-        let mut touching = 0_u32;
         let mut deepest = 0.0_f32;
-        for c in 0..n {
+        for &c in &touching {
             residual[c] = sunk[c] + gap[c] - depth;
-            if p[c] > 0.0 {
-                deepest = deepest.max(sunk[c]);
-                now += f64::from(residual[c] * residual[c]);
-                touching += 1;
-            }
+            deepest = deepest.max(sunk[c]);
+            now += f64::from(residual[c] * residual[c]);
         }
-        if (now / f64::from(touching)).sqrt() < TOLERANCE * f64::from(deepest) {
+        if (now / touching.len() as f64).sqrt() < TOLERANCE * f64::from(deepest) {
             break;
         }
         let share = conjugate * (now / before) as f32;
-        for c in 0..n {
-            direction[c] = if p[c] > 0.0 { share * direction[c] - residual[c] } else { 0.0 };
-        }
+        touching.iter().for_each(|&c| direction[c] = share * direction[c] - residual[c]);
         before = now;
         apply_compliance(gel, &direction, &mut moved, scratch);
-        let level = mean_of_touching(&p, moved.iter().copied());
+        let level = mean_over(&touching, |c| moved[c]);
         let (mut descent, mut curvature) = (0.0_f64, 0.0_f64);
-        for c in (0..n).filter(|&c| p[c] > 0.0) {
+        for &c in &touching {
             descent -= f64::from(residual[c] * direction[c]);
             curvature += f64::from((moved[c] - level) * direction[c]);
         }
@@ -71,20 +66,21 @@ pub(super) fn solve_normal_contact(
         }
         let step = (descent / curvature) as f32;
         // Cells that would pull lose contact, cells that overlap gain it.
-        let (mut is_same_contact, mut sum) = (true, 0.0_f64);
-        for c in 0..n {
-            if p[c] > 0.0 {
-                p[c] += step * direction[c];
-                if p[c] <= 0.0 {
-                    (p[c], is_same_contact) = (0.0, false);
-                }
-            } else if residual[c] < 0.0 {
-                (p[c], is_same_contact) = (-step * residual[c], false);
+        let overlap = |c: usize| depth - (sunk[c] + gap[c]);
+        let gained: Vec<usize> = (0..n).filter(|&c| p[c] <= 0.0 && overlap(c) > 0.0).collect();
+        let mut is_same_contact = gained.is_empty();
+        for &c in &touching {
+            p[c] += step * direction[c];
+            if p[c] <= 0.0 {
+                (p[c], direction[c], is_same_contact) = (0.0, 0.0, false);
             }
-            sum += f64::from(p[c]);
         }
-        let scale = total / sum as f32;
-        p.iter_mut().for_each(|p| *p *= scale);
+        gained.iter().for_each(|&c| p[c] = step * overlap(c));
+        if !is_same_contact {
+            touching = touching_cells(&p);
+        }
+        let scale = total / touching.iter().map(|&c| f64::from(p[c])).sum::<f64>() as f32;
+        touching.iter().for_each(|&c| p[c] *= scale);
         if is_same_contact {
             conjugate = 1.0;
             sunk.iter_mut().zip(&moved).for_each(|(u, m)| *u = scale * (*u + step * m));
@@ -96,16 +92,15 @@ pub(super) fn solve_normal_contact(
     Some(NormalSolution { pressure: p, approach })
 }
 
-/// Mean of `values` over the cells with pressure.
-fn mean_of_touching(p: &[f32], values: impl Iterator<Item = f32>) -> f32 {
-    let (mut sum, mut count) = (0.0_f64, 0.0_f64);
-    for (&p, value) in p.iter().zip(values) {
-        if p > 0.0 {
-            sum += f64::from(value);
-            count += 1.0;
-        }
-    }
-    (sum / count) as f32
+/// The cells with pressure.
+fn touching_cells(p: &[f32]) -> Vec<usize> {
+    (0..p.len()).filter(|&c| p[c] > 0.0).collect()
+}
+
+/// Mean of a value over some cells.
+fn mean_over(cells: &[usize], value: impl Fn(usize) -> f32) -> f32 {
+    let sum: f64 = cells.iter().map(|&c| f64::from(value(c))).sum();
+    (sum / cells.len() as f64) as f32
 }
 
 /// Writes the displacement of the surface (into gel and body together) by a pressure, m.
@@ -133,7 +128,14 @@ fn winkler_pressure(gap: &[f32], total: f32, stiffness: f32) -> Option<Vec<f32>>
     if !least.is_finite() {
         return None;
     }
-    let sum = |depth: f32| gap.iter().map(|&g| f64::from((depth - g).max(0.0) * stiffness)).sum::<f64>();
+    // Eight interleaved sums, which the compiler vectorises.
+    let sum = |depth: f32| {
+        let mut sums = [0.0_f64; 8];
+        let force = |g: f32| f64::from((depth - g).max(0.0) * stiffness);
+        let (eights, rest) = gap.as_chunks::<8>();
+        eights.iter().for_each(|some| sums.iter_mut().zip(some).for_each(|(sum, g)| *sum += force(*g)));
+        sums.into_iter().chain(rest.iter().map(|g| force(*g))).sum::<f64>()
+    };
     let mut high = 1e-5_f32;
     while sum(least + high) < f64::from(total) && high < 1.0 {
         high *= 2.0;

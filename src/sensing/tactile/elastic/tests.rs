@@ -4,14 +4,15 @@
 //! disc of 1.5 mm. Depth and outward displacement of the sphere are checked in `tests/validation/gel.rs`.
 
 use super::{
-    Gel, GelField, GelScratch, PadWrench, SkinMesh, TactileContact, TactileContactError, cubic_taps,
+    Gel, GelField, GelScratch, PadWrench, SkinMesh, SubstrateCompliance, TactileContact, TactileContactError,
+    cubic_taps,
     gel::LayerKernels,
     gel_field::surface_displacement,
     tangential_contact::{TangentialSolution, solve_tangential_contact},
 };
 use softvt_geometry::Vec3;
 use softvt_robot::PadSurface;
-use softvt_robot::tactile::TactileSpec;
+use softvt_robot::tactile::{GelSpec, TactileSpec};
 
 /// Vertices and triangles of a skin in the pad frame.
 pub(in super::super) struct TestSkin {
@@ -206,18 +207,25 @@ fn the_field_does_not_depend_on_earlier_uses_of_the_scratch() {
     let gel = gel(PadSurface::default());
     let skin = sphere([1e-3, -5e-4]);
     let skins = [skin.mesh()];
-    let contact = |f| TactileContact {
+    let contact = |f, substrate| TactileContact {
         wrench: PadWrench::new(f, [0.1 * f, 0.0], 0.0, [0.0; 2]),
         skins: &skins,
         friction: 1.5,
-        substrate: None,
+        substrate,
     };
+    let body = Some(SubstrateCompliance { modulus: 1e5, resolved: 8e-3 });
+    let solve = |gel: &Gel, contact: &TactileContact, scratch: &mut GelScratch| {
+        let field = GelField::solve(gel, contact, scratch).expect("good").expect("touch");
+        (field.pressure, field.displacement)
+    };
+    let soft =
+        TactileSpec { gel: GelSpec { shear_modulus: 5e4, ..GelSpec::default() }, ..TactileSpec::default() };
+    let soft = Gel::new(&soft, PadSurface::default()).expect("good numbers");
     let mut used = GelScratch::default();
-    GelField::solve(&gel, &contact(3.0), &mut used).expect("good");
-    let again = GelField::solve(&gel, &contact(1.0), &mut used).expect("good").expect("touch");
-    let fresh = GelField::solve(&gel, &contact(1.0), &mut GelScratch::default());
-    let fresh = fresh.expect("good").expect("touch");
-    assert_eq!((again.pressure, again.displacement), (fresh.pressure, fresh.displacement));
+    for (gel, f, substrate) in [(&gel, 3.0, None), (&gel, 1.0, None), (&gel, 1.0, body), (&soft, 1.0, body)] {
+        let contact = contact(f, substrate);
+        assert_eq!(solve(gel, &contact, &mut used), solve(gel, &contact, &mut GelScratch::default()));
+    }
 }
 
 #[test]
@@ -238,7 +246,7 @@ fn bad_contacts_are_named_and_no_force_is_no_contact() {
 
 #[test]
 fn kernels_are_finite() {
-    let LayerKernels { normal, tangential, coupling, .. } = &gel(PadSurface::default()).kernels;
+    let LayerKernels { normal, tangential, coupling, .. } = &*gel(PadSurface::default()).kernels;
     let all = [normal].into_iter().chain(tangential).chain(coupling);
     assert!(all.flatten().all(|value| value.is_finite()) && normal.iter().all(|&n| n > 0.0));
 }

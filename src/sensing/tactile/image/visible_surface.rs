@@ -184,14 +184,19 @@ fn blur([a, b, c, d, e]: [&[f32]; 5], out: &mut [f32]) {
 fn resample(field: &[f32], count: [usize; 2], x: &[PixelTaps], y: &[PixelTaps]) -> Vec<f32> {
     let (wide, n) = (x.len(), count[0]);
     let mut lines = vec![0.0_f32; wide * count[1]];
+    // A row between zeros, so that no tap is outside.
+    const MARGIN: usize = 4;
+    let mut padded = vec![0.0; n + 2 * MARGIN];
+    let starts: Vec<usize> = x
+        .iter()
+        .map(|taps| (taps.first + MARGIN as isize).clamp(0, (n + MARGIN) as isize) as usize)
+        .collect();
     for (line, row) in lines.chunks_exact_mut(wide).zip(field.chunks_exact(n)) {
-        for (out, PixelTaps { first, weights }) in line.iter_mut().zip(x) {
-            for (k, w) in weights.iter().enumerate() {
-                let i = first + k as isize;
-                if (0..n as isize).contains(&i) {
-                    *out += w * row[i as usize];
-                }
-            }
+        padded[MARGIN..MARGIN + n].copy_from_slice(row);
+        for ((out, PixelTaps { weights: [wa, wb, wc, wd], .. }), start) in line.iter_mut().zip(x).zip(&starts)
+        {
+            let Some([a, b, c, d]) = padded[*start..].first_chunk() else { continue };
+            *out = wa * a + wb * b + wc * c + wd * d;
         }
     }
     let outside = vec![0.0; wide];
