@@ -8,7 +8,7 @@ use cpu_time::ThreadTime;
 use super::{
     config::RunConfig,
     error::RunError,
-    rates::{Caches, all_streams, first_episode, observations_per_s, suite_of, time_episode},
+    rates::{Caches, all_streams, fastest, first_episode, observations_per_s, suite_of, time_episode},
 };
 use softvt_common::{cancel, text::TextTable};
 use softvt_geometry::{Pose, Vec3, shape::Shape};
@@ -98,7 +98,7 @@ pub fn measure(
     let mut of_threads = Vec::new();
     for count in std::iter::successors(Some(1), |count| Some(2 * count)).take_while(|count| *count <= threads)
     {
-        let cost = observations_per_s(&loaded, count, &caches)?;
+        let cost = fastest(|| observations_per_s(&loaded, count, &caches))?;
         of_threads.push(GrowthPoint { size: count as f64, cost });
     }
     on_stage("pixels");

@@ -22,6 +22,8 @@ use softvt_rollout::{AssetCache, Controller, Episode, EpisodeSpec, SensorAssets,
 use softvt_scene::STANDARD_CAMERAS;
 use softvt_script::{EpisodeSetup, ExpertController, ExpertGrip, LoadedScript, SceneChanges};
 
+/// Number of episodes of which the fastest counts: other work on the machine only makes them slower.
+const EPISODES: usize = 5;
 /// What an observation holds, in the order of [`MachineRates::streams`].
 const STREAMS: [&str; 4] = ["state", "state, cameras", "state, touch", "all streams"];
 
@@ -76,7 +78,7 @@ impl MachineRates {
         let names = [("here", here), ("published", published)]
             .map(|(which, rates)| format!("{which}: softvt {}, {}\n", rates.softvt, rates.machine));
         format!(
-            "Observations per second, and the multiple of real time, in {} task 0\n\n{}\n{}",
+            "Observations per second, and the multiple of real time, in {} task 0: the fastest of {EPISODES} episodes\n\n{}\n{}",
             here.script,
             TextTable::fitted(&rows, |column| column > 0),
             names.concat()
@@ -120,12 +122,14 @@ pub fn measure(
     let mut streams = Vec::new();
     for (index, name) in STREAMS.into_iter().enumerate() {
         on_stage(name);
-        let timing = time_episode(&loaded, &streams_of(index), &caches)?;
-        streams
-            .push(StreamRate { streams: name.to_owned(), observations_per_s: timing.steps / timing.cpu_s });
+        let rate = || {
+            let timing = time_episode(&loaded, &streams_of(index), &caches)?;
+            Ok(timing.steps / timing.cpu_s)
+        };
+        streams.push(StreamRate { streams: name.to_owned(), observations_per_s: fastest(rate)? });
     }
     on_stage("all threads");
-    let observations_per_s = observations_per_s(&loaded, threads, &caches)?;
+    let observations_per_s = fastest(|| observations_per_s(&loaded, threads, &caches))?;
     Ok(MachineRates {
         softvt: env!("CARGO_PKG_VERSION").to_owned(),
         script: script.to_owned(),
@@ -136,6 +140,11 @@ pub fn measure(
         threads,
         observations_per_s,
     })
+}
+
+/// The highest of the rates of [`EPISODES`] episodes.
+pub(crate) fn fastest(mut rate: impl FnMut() -> Result<f64, RunError>) -> Result<f64, RunError> {
+    (0..EPISODES).try_fold(0.0, |most: f64, _| Ok(most.max(rate()?)))
 }
 
 /// Observations per second of wall time with all streams, with `threads` episodes at the same time.
