@@ -261,8 +261,8 @@ impl ShadowMap {
         })
     }
 
-    /// Visible fraction of the light at points of normals `n`, given in the frame of this map; 1 where `mask` is clear or
-    /// the map does not reach.
+    /// Visible fraction of the light at points of normals `n`, given in the frame of this map; 1 where `mask` is clear
+    /// or the map does not reach.
     #[inline(always)]
     pub(crate) fn visibility(&self, at: &LightSpacePoints, n: &Vec3x8, mask: f32x8) -> f32x8 {
         let inside = (at.is_inside & mask).to_bitmask();
@@ -511,8 +511,8 @@ impl<'a> Receivers<'a> {
         FilteredLight { visible, radius }
     }
 
-    /// Occluders in a square of half-width `radius`, texels, around receiver `i`, of which every `STEP`th row and column
-    /// is read.
+    /// Occluders in a square of half-width `radius`, texels, around receiver `i`, of which every `STEP`th row and
+    /// column is read.
     ///
     /// They are weighed by the lamp's cone alone, so that the result does not depend on the radius.
     #[inline(always)]
@@ -591,7 +591,7 @@ impl<'a, const STEP: usize> FilterWindow<'a, STEP> {
     fn new(receivers: &Receivers<'a>, i: usize, radius: f32) -> Self {
         let map = receivers.map;
         let [u, v, height] = receivers.position.each_ref().map(|lanes| lanes[i]);
-        // The first texel read at most `radius` before the receiver. Vectors convert without the checks that scalars do.
+        // The first texel read at most `radius` before the receiver. Vectors are converted without checks of the range.
         let before = f32x4::new([u, v, 0.0, 0.0]) - f32x4::splat(radius + 0.5);
         let first = (before * f32x4::splat(1.0 / STEP as f32) + f32x4::ONE).fast_trunc_int();
         let [first_u, first_v, ..] =
