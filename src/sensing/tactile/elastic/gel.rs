@@ -57,7 +57,7 @@ pub struct GelScratch {
     pub(super) buffers: FftBuffers,
     /// Spectrum of the compliance of gel and body in series.
     pub(super) compliance: Vec<f32>,
-    /// What this spectrum is made of.
+    /// The gel and the body of this spectrum.
     compliance_of: Option<(Arc<LayerKernels>, Option<SubstrateCompliance>)>,
     /// Size of the transform for which the buffers are allocated.
     pub(super) size: [usize; 2],
