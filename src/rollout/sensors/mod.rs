@@ -347,7 +347,8 @@ impl Sensors {
         let patch = patch.unwrap_or(&none);
         let pad_w = self.pads_w(frame)[index];
         let w_p = pad_w.inverse();
-        let (mut touching, mut substrate) = (Vec::new(), None);
+        let mut touching: Vec<(&ObjectInstance, Arc<TactileSkin>)> = Vec::new();
+        let mut substrate = None;
         for (index, object) in
             self.objects.iter().enumerate().filter(|(_, object)| is_in_contact(object, patch))
         {
@@ -361,15 +362,14 @@ impl Sensors {
             touching.push((object, skin));
             substrate = substrate_of(object);
         }
-        let placed =
-            touching.iter().map(|(object, skin): &(&ObjectInstance, Arc<TactileSkin>)| match object.body {
-                BodyId::Soft(body) => skin.place_soft(frame.soft(body), &w_p),
-                BodyId::Rigid(body) => skin.place_rigid(&(w_p * frame.rigid(body))),
-                BodyId::Link(link) => {
-                    skin.place_rigid(&(w_p * frame.link(link) * object.joint_frame_o().inverse()))
-                }
-                BodyId::World | BodyId::Kinematic(_) => skin.place_rigid(&(w_p * object.start_w)),
-            });
+        let placed = touching.iter().map(|(object, skin)| match object.body {
+            BodyId::Soft(body) => skin.place_soft(frame.soft(body), &w_p),
+            BodyId::Rigid(body) => skin.place_rigid(&(w_p * frame.rigid(body))),
+            BodyId::Link(link) => {
+                skin.place_rigid(&(w_p * frame.link(link) * object.joint_frame_o().inverse()))
+            }
+            BodyId::World | BodyId::Kinematic(_) => skin.place_rigid(&(w_p * object.start_w)),
+        });
         let placed: Vec<PlacedSkin> = placed.collect();
         let skins: Vec<SkinMesh> = placed.iter().map(PlacedSkin::mesh).collect();
         let contact = TactileContact {

@@ -548,15 +548,12 @@ const TILE_TEXELS: usize = TILE_STRIDE * TILE_STRIDE;
 /// The packed texels of a tile, row by row; those beyond the level are 0.
 type Tile = [u32; TILE_TEXELS];
 
-/// The extreme of eight numbers, which are mostly the same.
+/// The extreme value of eight, which are mostly equal. `of_two` is the lower or the higher of two.
 #[inline(always)]
-fn extreme(of: i32x8, extreme: impl Fn(i32, i32) -> i32) -> i32 {
+fn extreme(of: i32x8, of_two: impl Fn(i32, i32) -> i32) -> i32 {
     let lanes = of.to_array();
-    if of.simd_eq(i32x8::splat(lanes[0])).all() {
-        lanes[0]
-    } else {
-        lanes.into_iter().fold(lanes[0], extreme)
-    }
+    let is_uniform = of.simd_eq(i32x8::splat(lanes[0])).all();
+    if is_uniform { lanes[0] } else { lanes.into_iter().fold(lanes[0], of_two) }
 }
 
 /// A level of a mip map, in tiles of packed texels.

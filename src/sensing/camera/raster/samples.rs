@@ -134,7 +134,7 @@ struct ChunkPlanes {
     edges: [ChunkPlane; 3],
     thresholds: [f32x8; 3],
     w: ChunkPlane,
-    /// Range of w.
+    /// Lowest and highest w of the corners.
     range: [f32x8; 2],
     id: u32,
     is_full: bool,
@@ -176,7 +176,8 @@ impl TriangleSetup {
         }
         let per_pixel = f32x8::splat(1.0 / PIXELS_PER_CHUNK as f32);
         let to = (high * per_pixel + f32x8::ONE).fast_max(f32x8::ZERO);
-        [(low.fast_min(f32x8::splat(edge)) * per_pixel), to].map(|x| x.fast_trunc_int().to_array())
+        let from = low.fast_min(f32x8::splat(edge)) * per_pixel;
+        [from, to].map(|x| x.fast_trunc_int().to_array())
     }
 }
 

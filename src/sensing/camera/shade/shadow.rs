@@ -614,7 +614,7 @@ impl<'a, const STEP: usize> FilterWindow<'a, STEP> {
         }
     }
 
-    /// True if nothing in eight rows occludes.
+    /// True if nothing in eight rows occludes. False at the end of the map, where there are fewer.
     #[inline(always)]
     fn is_clear(&self) -> bool {
         let Some(texels) = self.heights.get(..(LANES - 1) * Self::STRIDE + LANES) else { return false };
