@@ -105,7 +105,9 @@ pub(crate) fn detect(
     let around = body_bounds.body.unwrap_or(bounds);
     let lever = (around.centre() - motion.origin).norm() + around.size().norm();
     let speed = body_bounds.max_speed + motion.linear.norm() + motion.angular.norm() * lever;
-    let near_collider = bounds.transformed(&motion.pose).loosened(reach.max(limits.approach_distance(speed)));
+    // No sample contacts the collider from farther away.
+    let farthest = reach.max(limits.approach_distance(speed));
+    let near_collider = bounds.transformed(&motion.pose).loosened(farthest);
     if !around.intersects(&near_collider) {
         return;
     }
@@ -114,7 +116,11 @@ pub(crate) fn detect(
         if !around.intersects(&near_collider) {
             continue;
         }
-        let nodes = LocalNodeGroup::new(body, &group.nodes[..group.count], motion, &frame);
+        let mut nodes = LocalNodeGroup::new(body, &group.nodes[..group.count], &frame);
+        if !nodes.bounds.intersects(&bounds.loosened(farthest)) {
+            continue;
+        }
+        nodes.set_velocities(body, &group.nodes[..group.count], motion);
         let ahead = limits.approach_distance(nodes.max_speed);
         let near_surface = bounds.loosened(reach.max(ahead));
         if !nodes.bounds.intersects(&near_surface) {
@@ -168,7 +174,8 @@ struct LocalNodeGroup {
 }
 
 impl LocalNodeGroup {
-    fn new(body: &FemState, nodes: &[u32], motion: &ColliderMotion, frame: &ColliderFrame) -> Self {
+    /// The group with its velocities left at zero.
+    fn new(body: &FemState, nodes: &[u32], frame: &ColliderFrame) -> Self {
         let mut local = Self {
             count: nodes.len(),
             x: [Vec3::zeros(); 8],
@@ -177,15 +184,21 @@ impl LocalNodeGroup {
             max_speed: 0.0,
         };
         for (i, &node) in nodes.iter().enumerate() {
-            let x = &body.x[node as usize];
-            local.x[i] = frame.to_world.tr_mul(&(x - frame.origin));
-            local.v[i] = body.v[node as usize] - motion.velocity(x);
+            local.x[i] = frame.to_world.tr_mul(&(body.x[node as usize] - frame.origin));
             local.bounds.min = local.bounds.min.inf(&local.x[i]);
             local.bounds.max = local.bounds.max.sup(&local.x[i]);
-            local.max_speed = local.max_speed.max(local.v[i].norm_squared());
         }
-        local.max_speed = local.max_speed.sqrt();
         local
+    }
+
+    /// Sets the velocities. Most groups turn out to be too far away without them.
+    fn set_velocities(&mut self, body: &FemState, nodes: &[u32], motion: &ColliderMotion) {
+        let mut fastest = 0.0_f64;
+        for (v, &node) in self.v.iter_mut().zip(nodes) {
+            *v = body.v[node as usize] - motion.velocity(&body.x[node as usize]);
+            fastest = fastest.max(v.norm_squared());
+        }
+        self.max_speed = fastest.sqrt();
     }
 
     /// Speed of a sample against the collider, m/s.
