@@ -186,6 +186,24 @@ fn closed_idle_connections_are_reopened() {
     assert_eq!(pongs.load(Ordering::Relaxed), 3, "six questions over three connections");
 }
 
+#[test]
+fn websockets_that_a_server_closes_are_reopened_although_it_keeps_their_tcp_connections() {
+    let questions = Arc::new(AtomicUsize::new(0));
+    let (count, kept) = (questions.clone(), Mutex::new(Vec::new()));
+    let address = server(9, move |_, mut socket| {
+        let _ = socket.send(packed(&Value::Map(Vec::new())));
+        if let Some(question) = observation(&mut socket) {
+            count.fetch_add(1, Ordering::Relaxed);
+            let _ = socket.write(hold(&question, 50));
+            let _ = socket.write(Message::Close(None));
+            let _ = socket.flush();
+        }
+        kept.lock().expect("unpoisoned").push(socket);
+    });
+    run(&project(), &address).replan(5).finish();
+    assert_eq!(questions.load(Ordering::Relaxed), 3);
+}
+
 /// Five actions that close the gripper: a reply that is wrong for an observation answered by `hold`.
 fn shut() -> Message {
     packed(&actions(5, [0.4, 0.0, 0.3, 3.1, 0.0, 0.0, 1.0]))

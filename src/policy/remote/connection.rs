@@ -11,6 +11,7 @@ use std::{
 use rmpv::Value;
 use tungstenite::{
     ClientRequestBuilder, Error, Message, WebSocket, client,
+    error::ProtocolError,
     http::Uri,
     protocol::{CloseFrame, frame::coding::CloseCode},
 };
@@ -104,7 +105,9 @@ impl PolicyServer {
 
     fn socket_error(&self, error: &Error) -> PolicyError {
         match error {
-            Error::ConnectionClosed | Error::AlreadyClosed => self.error("closed the connection"),
+            Error::ConnectionClosed
+            | Error::AlreadyClosed
+            | Error::Protocol(ProtocolError::SendAfterClosing) => self.error("closed the connection"),
             Error::Capacity(_) => self.error(&format!(
                 "sent more than {} MiB in one message: no chunk of actions is as long",
                 MAX_MESSAGE_BYTES >> 20
@@ -241,7 +244,10 @@ impl PolicyConnection {
                 Ok(Message::Binary(_)) => return Err(self.server.unrequested()),
                 Ok(Message::Text(text)) => return Err(self.reported_error(&text)),
                 Err(Error::Io(error)) if would_block(&error) => {
-                    return Ok(self.socket.get_mut().set_nonblocking(false).is_ok());
+                    // The server may have closed the websocket, but not yet its TCP connection.
+                    return Ok(
+                        self.socket.can_write() && self.socket.get_mut().set_nonblocking(false).is_ok()
+                    );
                 }
                 // The end: a new connection is needed.
                 _ => return Ok(false),
