@@ -111,17 +111,17 @@ pub(crate) fn detect(
     if !around.intersects(&near_collider) {
         return;
     }
-    let frame = ColliderFrame::new(motion);
+    let (frame, near_in_frame) = (ColliderFrame::new(motion), bounds.loosened(farthest));
     for (index, (group, around)) in body.model.groups.iter().zip(&body_bounds.groups).enumerate() {
         if !around.intersects(&near_collider) {
             continue;
         }
         let mut nodes = LocalNodeGroup::new(body, &group.nodes[..group.count], &frame);
-        if !nodes.bounds.intersects(&bounds.loosened(farthest)) {
+        if !nodes.bounds.intersects(&near_in_frame) {
             continue;
         }
         nodes.set_velocities(body, &group.nodes[..group.count], motion);
-        let ahead = limits.approach_distance(nodes.max_speed);
+        let ahead = limits.approach_distance(nodes.max_speed());
         let near_surface = bounds.loosened(reach.max(ahead));
         if !nodes.bounds.intersects(&near_surface) {
             continue;
@@ -170,7 +170,6 @@ struct LocalNodeGroup {
     x: [Vec3; 8],
     v: [Vec3; 8],
     bounds: Aabb,
-    max_speed: f64,
 }
 
 impl LocalNodeGroup {
@@ -181,7 +180,6 @@ impl LocalNodeGroup {
             x: [Vec3::zeros(); 8],
             v: [Vec3::zeros(); 8],
             bounds: Aabb { min: Vec3::repeat(f64::INFINITY), max: Vec3::repeat(f64::NEG_INFINITY) },
-            max_speed: 0.0,
         };
         for (i, &node) in nodes.iter().enumerate() {
             local.x[i] = frame.to_world.tr_mul(&(body.x[node as usize] - frame.origin));
@@ -193,12 +191,14 @@ impl LocalNodeGroup {
 
     /// Sets the velocities. Most groups turn out to be too far away without them.
     fn set_velocities(&mut self, body: &FemState, nodes: &[u32], motion: &ColliderMotion) {
-        let mut fastest = 0.0_f64;
         for (v, &node) in self.v.iter_mut().zip(nodes) {
             *v = body.v[node as usize] - motion.velocity(&body.x[node as usize]);
-            fastest = fastest.max(v.norm_squared());
         }
-        self.max_speed = fastest.sqrt();
+    }
+
+    /// Speed of the fastest node against the collider, m/s.
+    fn max_speed(&self) -> f64 {
+        self.v.iter().map(Vec3::norm_squared).fold(0.0, f64::max).sqrt()
     }
 
     /// Speed of a sample against the collider, m/s.

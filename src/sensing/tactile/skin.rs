@@ -40,7 +40,7 @@ pub struct PlacedSkin<'a> {
 }
 
 impl PlacedSkin<'_> {
-    /// The triangles.
+    /// The mesh that presses on the gel.
     pub fn mesh(&self) -> SkinMesh<'_> {
         SkinMesh { vertices: &self.vertices, triangles: &self.triangles }
     }
