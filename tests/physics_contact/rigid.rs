@@ -1,5 +1,7 @@
 //! Rigid against rigid; what has a closed form is in `tests/validation/rigid.rs`.
 
+use std::f64::consts::FRAC_PI_2;
+
 use softvt::{
     geometry::{Pose, Vec3, shape::Shape},
     physics::{BodyId, RigidId, World},
@@ -90,6 +92,32 @@ fn a_resting_box_falls_asleep_and_a_push_wakes_it() {
     let (upper, lower) = (position(&world, high), position(&world, low));
     assert!(upper.x > 0.005, "pushed: {upper}");
     assert!(lower.x < 0.5 * upper.x && !world.rigid(high).is_asleep(), "{lower}");
+}
+
+#[test]
+fn a_cone_stays_on_its_side_on_a_thin_shelf() {
+    let mut world = world();
+    let shelf = cuboid(0.2, 0.2, 0.004);
+    world.add_shape("shelf", BodyId::World, Pose::translation(0.0, 0.0, -0.002), &shelf, friction(0.6, 0.5));
+    let cone = Shape::lathe(vec![[0.0, -0.01], [0.01, 0.01], [0.0, 0.01]]).expect("a cone");
+    let inertia = nalgebra::Matrix3::from_diagonal(&Vec3::repeat(4e-6));
+    // On its side, the axis rises from the tip by half the opening angle.
+    let half_angle = 0.5_f64.atan();
+    let pose = turned(at(0.0, 0.0, 0.01 * half_angle.sin() + 1e-3), Vec3::y() * (FRAC_PI_2 - half_angle));
+    let body =
+        softvt::physics::rigid::RigidState::new(&pose, Vec3::z() * 0.005, 0.1, inertia).expect("a real body");
+    let index = world.add_rigid("cone", body);
+    world.add_shape("cone", index, Pose::identity(), &cone, friction(0.6, 0.5));
+    world.rigid_mut(index).state.v = Vec3::y() * 0.05;
+    for tenth in 0..30 {
+        run(&mut world, 0.1);
+        let object = world.rigid(index).state.object_w();
+        let z = object.translation.vector.z;
+        assert!(
+            tenth < 5 || (z - 0.01 * half_angle.sin()).abs() < 1e-4,
+            "{z} m after {tenth} tenths of a second"
+        );
+    }
 }
 
 #[test]

@@ -26,6 +26,10 @@ const MIN_EIGENVALUE_RATIO: f64 = 0.07;
 const RIM_TURN: f64 = 0.34;
 /// The same for a corner on which the solid can stand, though it is part of a rounding.
 const FOOT_TURN: f64 = 5e-3;
+/// Slope of the edges of a profile from which they form a tip on the axis.
+const TIP_SLOPE: f64 = 0.34;
+/// Radius up to which a point of a profile is on the axis, m.
+const ON_AXIS: f64 = 1e-6;
 /// Distance from an edge at which its normals are compared, m: a rounding of less than 0.5 mm counts as an edge.
 const SHARP_DISTANCE: f64 = 1e-4;
 /// Difference of these normals (chord of the unit circle, 20°) beyond which the edge is sharp.
@@ -119,7 +123,7 @@ fn add_features(shape: &Shape, frame_o: &Pose, features: &mut SurfaceFeatures) {
         }
         Shape::Lathe(profile) => {
             for ProfileCorner { r, z, is_sharp } in convex_corners(profile) {
-                if r > 1e-6 {
+                if r > ON_AXIS {
                     features.rims.push(rim(z, r, is_sharp));
                 } else if is_sharp {
                     features.corners.push((frame_o * nalgebra::Point3::new(0.0, 0.0, z)).coords);
@@ -177,16 +181,25 @@ fn convex_corners(profile: &Polygon) -> impl Iterator<Item = ProfileCorner> + '_
     let count = points.len();
     (0..count).filter_map(move |i| {
         let (before, here, after) = (points[(i + count - 1) % count], points[i], points[(i + 1) % count]);
-        let (ar, az) = (here[0] - before[0], here[1] - before[1]);
-        let (br, bz) = (after[0] - here[0], after[1] - here[1]);
-        let sine = (ar * bz - az * br) / (ar.hypot(az) * br.hypot(bz));
-        // The centre of a flat end is a corner of the polygon, but not of the solid.
-        let is_tip =
-            here[0] > 1e-6 || az.abs().max(bz.abs()) > RIM_TURN * ar.abs().max(br.abs()) && ar * br < 0.0;
-        let is_sharp = sine > RIM_TURN;
-        let is_foot = sine > FOOT_TURN && here[0] > 1e-6 && az * bz <= 1e-9 * ar.hypot(az) * br.hypot(bz);
-        (is_sharp && is_tip || is_foot).then_some(ProfileCorner { r: here[0], z: here[1], is_sharp })
+        let [a, b] = [[before, here], [here, after]].map(|[from, to]| [to[0] - from[0], to[1] - from[1]]);
+        let lengths = a[0].hypot(a[1]) * b[0].hypot(b[1]);
+        let sine = (a[0] * b[1] - a[1] * b[0]) / lengths;
+        let (is_sharp, is_corner) = if here[0] <= ON_AXIS {
+            let is_tip = is_tip(a, b);
+            (is_tip, is_tip)
+        } else {
+            let is_foot = sine > FOOT_TURN && a[1] * b[1] <= 1e-9 * lengths;
+            (sine > RIM_TURN, sine > RIM_TURN || is_foot)
+        };
+        is_corner.then_some(ProfileCorner { r: here[0], z: here[1], is_sharp })
     })
+}
+
+/// True if the edges `a` and `b` (r, z) of a profile meet on the axis in a convex tip of the solid. Of a solid
+/// cone, one of them runs along the axis.
+fn is_tip(a: [f64; 2], b: [f64; 2]) -> bool {
+    // At the bottom of a pit, both edges run in the same direction along z; at the centre of a flat end, one does not.
+    a[1] * b[1] < 0.0 && [a, b].iter().all(|[r, z]| z.abs() > TIP_SLOPE * r.abs())
 }
 
 /// Signed distances on a grid that covers a shape.

@@ -219,6 +219,44 @@ mod tests {
     }
 
     #[test]
+    fn a_cone_on_its_side_lies_on_its_tip_and_the_lowest_point_of_its_rim() {
+        let (ground, ground_w) = floor();
+        for radius in [0.002, 0.01, 0.03] {
+            let profile = [[0.0, -0.01], [radius, 0.01], [0.0, 0.01]];
+            // The tip below, or above.
+            let upside_down = profile.map(|[r, z]| [r, -z]).into_iter().rev().collect();
+            for (profile, tip_z) in [(profile.to_vec(), -0.01), (upside_down, 0.01)] {
+                let cone = Shape::lathe(profile).expect("a cone");
+                let half_angle = f64::atan2(radius, 0.02);
+                let turn = Quat::from_scaled_axis(Vec3::y() * (FRAC_PI_2 + half_angle * f64::signum(tip_z)));
+                let tip = turn * Vec3::z() * tip_z;
+                let pose = Pose::from_parts(nalgebra::Translation3::new(0.0, 0.0, -tip.z - 1e-5), turn);
+                let points = touch(&cone, &pose, &ground, &ground_w, 5e-6);
+                let side = 0.02_f64.hypot(radius);
+                for distance in [0.0, side] {
+                    let is_there = |p: &&ManifoldPoint| {
+                        let from_tip = p.position_w.xy() - tip.xy();
+                        (from_tip.norm() - distance).abs() < 1e-5 && (p.gap + 1e-5).abs() < 1e-7
+                    };
+                    let area: f64 = points.iter().filter(is_there).map(|p| p.area).sum();
+                    assert!(area >= SAMPLE_AREA, "radius {radius}, tip at {tip_z}: {points:?}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn flat_ends_and_pits_of_a_lathe_have_no_tips() {
+        let can = vec![[0.0, -0.05], [0.033, -0.05], [0.033, 0.05], [0.0, 0.05]];
+        let with_pits = vec![[0.0, -0.03], [0.033, -0.05], [0.033, 0.05], [0.0, 0.03]];
+        let with_tips = vec![[0.0, -0.07], [0.033, -0.05], [0.033, 0.05], [0.0, 0.07]];
+        for (profile, tips) in [(can, 0), (with_pits, 0), (with_tips, 2)] {
+            let features = SurfaceFeatures::of(&Shape::lathe(profile).expect("a lathe"));
+            assert_eq!((features.corners.len(), features.rims.len()), (tips, 2), "{features:?}");
+        }
+    }
+
+    #[test]
     fn sharp_edges_of_a_general_solid_are_found_where_they_are() {
         // A block with a rectangular notch: 60 × 40 × 30 mm less 20 × 40+ × 10 mm from the top.
         let notch = Shape::cuboid(Vec3::new(0.02, 0.1, 0.02)).translated(Vec3::new(0.0, 0.0, 0.015));
