@@ -2,7 +2,7 @@
 
 use super::collider::Collider;
 use crate::fem::FemState;
-use softvt_geometry::{Aabb, Mat3, Pose, Vec3};
+use softvt_geometry::{Aabb, Mat3, Pose, Vec3, shape::SampleContact};
 
 /// A sample near a surface, at the start of the step.
 #[derive(Clone, Copy, Debug)]
@@ -68,6 +68,8 @@ pub(crate) struct BodyBounds {
     body: Option<Aabb>,
     groups: Vec<Aabb>,
     max_speed: f64,
+    /// Largest spacing of the samples of a group, m.
+    max_spacing: f64,
 }
 
 impl BodyBounds {
@@ -75,6 +77,7 @@ impl BodyBounds {
     pub(crate) fn update(&mut self, body: &FemState) {
         self.body = Aabb::from_points(&body.x);
         self.max_speed = body.max_speed();
+        self.max_spacing = body.model.groups.iter().map(|group| group.spacing).fold(0.0, f64::max);
         self.groups.clear();
         self.groups.extend(body.model.groups.iter().map(|group| {
             let first = body.x[group.nodes[0] as usize];
@@ -105,13 +108,14 @@ pub(crate) fn detect(
     let around = body_bounds.body.unwrap_or(bounds);
     let lever = (around.centre() - motion.origin).norm() + around.size().norm();
     let speed = body_bounds.max_speed + motion.linear.norm() + motion.angular.norm() * lever;
-    // No sample contacts the collider from farther away.
-    let farthest = reach.max(limits.approach_distance(speed));
-    let near_collider = bounds.transformed(&motion.pose).loosened(farthest);
+    // No sample contacts the collider from farther away: one may cover a face from half a spacing beyond its edge.
+    let search_distance =
+        margin.max(reach).max(limits.approach_distance(speed)) + 0.5 * body_bounds.max_spacing;
+    let near_collider = bounds.transformed(&motion.pose).loosened(search_distance);
     if !around.intersects(&near_collider) {
         return;
     }
-    let (frame, near_in_frame) = (ColliderFrame::new(motion), bounds.loosened(farthest));
+    let (frame, near_in_frame) = (ColliderFrame::new(motion), bounds.loosened(search_distance));
     for (index, (group, around)) in body.model.groups.iter().zip(&body_bounds.groups).enumerate() {
         if !around.intersects(&near_collider) {
             continue;
@@ -121,26 +125,41 @@ pub(crate) fn detect(
             continue;
         }
         nodes.set_velocities(body, &group.nodes[..group.count], motion);
-        let ahead = limits.approach_distance(nodes.max_speed());
-        let near_surface = bounds.loosened(reach.max(ahead));
+        let farthest = margin.max(reach).max(limits.approach_distance(nodes.max_speed()));
+        let near_surface = bounds.loosened(farthest + 0.5 * group.spacing);
         if !nodes.bounds.intersects(&near_surface) {
             continue;
         }
         // A patch contacts a face from half its edge beyond that of the face.
         let (centre, radius) = (nodes.bounds.centre(), 0.5 * nodes.bounds.size().norm());
-        if collider.surface.is_farther(&centre, margin.max(reach).max(ahead) + group.spacing + radius) {
+        if collider.surface.is_farther(&centre, farthest + group.spacing + radius) {
             continue;
         }
-        let mut is_near = false;
+        let (mut is_near, mut clear) = (false, ClearBall::default());
         for sample in group.first..group.last {
-            let candidate = test_sample(body, collider, &frame, &nodes, index, sample, &near_surface);
-            let Some(candidate) = candidate else { continue };
-            is_near |= candidate.gap < reach;
-            let weights = &body.model.samples[sample].weights;
-            if candidate.gap < margin
-                || (candidate.gap < ahead && candidate.gap < limits.approach_distance(nodes.speed(weights)))
-            {
-                out.push(candidate);
+            let data = &body.model.samples[sample];
+            let local = weighted_mean(nodes.count, &nodes.x, &data.weights);
+            if !near_surface.contains(&local) || clear.contains(&local) {
+                continue;
+            }
+            let facing = body.rotation[data.surface.at.element as usize] * data.surface.n_o;
+            let local_facing = frame.to_world.tr_mul(&facing);
+            let spacing = data.surface.area.sqrt();
+            let SampleContact { gap, normal, coverage } =
+                collider.surface.contact(&local, &local_facing, spacing);
+            if gap > farthest {
+                clear = ClearBall::new(local, gap, farthest + group.spacing);
+                continue;
+            }
+            // Normals that agree mean that the surface is behind the sample: the far side of a thin body.
+            if coverage <= 0.0 || local_facing.dot(&normal) > 0.3 {
+                continue;
+            }
+            is_near |= gap < reach;
+            let normal = frame.to_world * normal;
+            if gap < margin || gap < limits.approach_distance(nodes.approach_speed(&data.weights, &normal)) {
+                let p = frame.to_world * local + frame.origin;
+                out.push(ContactCandidate { group: index, sample, p, gap, normal, coverage });
             }
         }
         if is_near {
@@ -161,6 +180,30 @@ impl ColliderFrame {
             to_world: *motion.pose.rotation.to_rotation_matrix().matrix(),
             origin: motion.pose.translation.vector,
         }
+    }
+}
+
+/// A ball in a collider's frame in which no sample contacts the collider.
+#[derive(Default)]
+struct ClearBall {
+    centre: Vec3,
+    radius2: f64,
+}
+
+impl ClearBall {
+    /// Share of a distance that is certain: those of composite shapes may be slightly too large.
+    const CERTAIN: f64 = 0.8;
+    /// Largest distance that is relied on, m; those of composite shapes are less accurate farther away.
+    const MAX_DISTANCE: f64 = 5e-3;
+
+    /// The ball around a sample at `centre` with this gap, in which all others are farther than `reach`, m.
+    fn new(centre: Vec3, gap: f64, reach: f64) -> Self {
+        let radius = (Self::CERTAIN * gap.min(Self::MAX_DISTANCE) - reach).max(0.0);
+        Self { centre, radius2: radius * radius }
+    }
+
+    fn contains(&self, p: &Vec3) -> bool {
+        (p - self.centre).norm_squared() < self.radius2
     }
 }
 
@@ -201,46 +244,112 @@ impl LocalNodeGroup {
         self.v.iter().map(Vec3::norm_squared).fold(0.0, f64::max).sqrt()
     }
 
-    /// Speed of a sample against the collider, m/s.
-    fn speed(&self, weights: &[f64; 8]) -> f64 {
-        weighted_mean(self.count, &self.v, weights).norm()
+    /// Speed of a sample towards a surface of unit normal `normal` (world) of the collider, m/s.
+    fn approach_speed(&self, weights: &[f64; 8], normal: &Vec3) -> f64 {
+        -weighted_mean(self.count, &self.v, weights).dot(normal)
     }
 }
 
 /// Weighted mean over `count` nodes. The four nodes of a face are the common case, for which the sum is unrolled.
+#[inline(always)]
 fn weighted_mean(count: usize, values: &[Vec3; 8], weights: &[f64; 8]) -> Vec3 {
     let over = |n: usize| (1..n).fold(values[0] * weights[0], |sum, i| sum + values[i] * weights[i]);
     if count <= 4 { over(4) } else { over(8) }
 }
 
-/// One sample against the surface, if it is within `near_surface` (collider frame) and the two face each other.
-fn test_sample(
-    body: &FemState,
-    collider: &Collider,
-    frame: &ColliderFrame,
-    nodes: &LocalNodeGroup,
-    group: usize,
-    sample: usize,
-    near_surface: &Aabb,
-) -> Option<ContactCandidate> {
-    let data = &body.model.samples[sample];
-    let local = weighted_mean(nodes.count, &nodes.x, &data.weights);
-    if !near_surface.contains(&local) {
-        return None;
+#[cfg(test)]
+mod tests {
+    use std::sync::{Arc, LazyLock};
+
+    use proptest::prelude::*;
+
+    use super::*;
+    use crate::{
+        BodyId,
+        contact::{Friction, SurfaceStiffness},
+        fem::{ElasticMaterial, FemModel},
+    };
+    use softvt_geometry::{Pose, Quat, samples::SampleSpec, shape::Shape};
+
+    const LIMITS: DetectionLimits = DetectionLimits { dt: 1.0 / 60.0, margin: 2e-4, reach: 2e-4 };
+
+    static BODY: LazyLock<FemState> = LazyLock::new(|| {
+        let material = ElasticMaterial::new(3e4, 0.3, 200.0).expect("valid");
+        let shape = Shape::cuboid(Vec3::new(0.04, 0.03, 0.05)).rounded(4e-3);
+        let model = FemModel::from_shape(&shape, 6e-5, material, 8, &SampleSpec::default()).unwrap();
+        FemState::new(model, &Pose::identity())
+    });
+
+    /// Surfaces with edges, of one piece and of several, with exact distances and approximate ones.
+    fn surfaces() -> [Shape; 5] {
+        let block = Shape::cuboid(Vec3::new(0.022, 0.022, 0.01));
+        [
+            block.clone(),
+            Shape::Cylinder { radius: 0.03, half_height: 0.01 },
+            Shape::Ellipsoid { radii: Vec3::new(0.03, 0.02, 0.01) },
+            Shape::cuboid(Vec3::new(0.08, 0.08, 0.05)).subtract(Shape::Sphere { radius: 0.035 }),
+            Shape::Union(vec![block.clone(), block.translated(Vec3::new(0.015, 0.004, 0.003))]),
+        ]
     }
-    let facing = body.rotation[data.surface.at.element as usize] * data.surface.n_o;
-    let local_facing = frame.to_world.tr_mul(&facing);
-    let contact = collider.surface.contact(&local, &local_facing, data.surface.area.sqrt());
-    // Normals that agree mean that the surface is behind the sample: the far side of a thin body.
-    if contact.coverage <= 0.0 || local_facing.dot(&contact.normal) > 0.3 {
-        return None;
+
+    /// The samples that [`detect`] should find with their gaps, by a test of every sample.
+    fn by_all_samples(body: &FemState, collider: &Collider, motion: &ColliderMotion) -> Vec<(usize, f64)> {
+        let mut found = Vec::new();
+        for group in &body.model.groups {
+            let nodes = &group.nodes[..group.count];
+            let mean = |values: &[Vec3], weights: &[f64; 8]| -> Vec3 {
+                nodes.iter().zip(weights).map(|(&node, w)| values[node as usize] * *w).sum()
+            };
+            for sample in group.first..group.last {
+                let data = &body.model.samples[sample];
+                let (p, v) = (mean(&body.x, &data.weights), mean(&body.v, &data.weights));
+                let facing = body.rotation[data.surface.at.element as usize] * data.surface.n_o;
+                let [local, facing] = [p - motion.pose.translation.vector, facing]
+                    .map(|vector| motion.pose.rotation.inverse() * vector);
+                let contact = collider.surface.contact(&local, &facing, data.surface.area.sqrt());
+                let approach = -(motion.pose.rotation * contact.normal).dot(&(v - motion.velocity(&p)));
+                let limit = LIMITS.margin.max(LIMITS.approach_distance(approach));
+                if contact.gap < limit && contact.coverage > 0.0 && facing.dot(&contact.normal) <= 0.3 {
+                    found.push((sample, contact.gap));
+                }
+            }
+        }
+        found
     }
-    Some(ContactCandidate {
-        group,
-        sample,
-        p: frame.to_world * local + frame.origin,
-        gap: contact.gap,
-        normal: frame.to_world * contact.normal,
-        coverage: contact.coverage,
-    })
+
+    proptest! {
+        #[test]
+        fn every_sample_in_contact_is_found_and_of_the_others_only_those_that_approach(
+            surface in 0_usize..5,
+            direction in prop::array::uniform3(-1.0..1.0),
+            turn in prop::array::uniform3(-3.0..3.0),
+            // Of the collider's origin from the body's centre, m.
+            distance in 0.015..0.05,
+            // Without any, only samples that touch or cover an edge are found.
+            speed in prop::sample::select(vec![0.0, 0.02, 0.3]),
+            linear in prop::array::uniform3(-1.0..1.0),
+            angular in prop::array::uniform3(-7.0..7.0),
+        ) {
+            let origin: Vec3 = Vec3::from(direction).try_normalize(1e-3).unwrap_or(Vec3::z()) * distance;
+            let pose = Pose::from_parts(origin.into(), Quat::from_scaled_axis(Vec3::from(turn)));
+            let motion =
+                ColliderMotion { pose, linear: Vec3::from(linear) * speed, angular: Vec3::from(angular) * speed, origin };
+            let stiffness = SurfaceStiffness { normal: 1e8, shear: 1e8 };
+            let surface = Arc::new(surfaces()[surface].clone());
+            let collider =
+                Collider::new("surface", BodyId::World, Pose::identity(), surface, Friction::NONE, stiffness);
+            let (mut bounds, mut found, mut near) = (BodyBounds::default(), Vec::new(), Vec::new());
+            bounds.update(&BODY);
+            detect(&BODY, &bounds, &collider, &motion, LIMITS, &mut found, &mut |group| near.push(group));
+            let found: Vec<_> = found.iter().map(|candidate| candidate.sample).collect();
+            let expected = by_all_samples(&BODY, &collider, &motion);
+            // Distances are approximate far from a surface, and differ from the gap where two faces meet.
+            let touching = expected.iter().filter(|(_, gap)| gap.abs() < LIMITS.margin);
+            let missed: Vec<_> = touching.filter(|(sample, _)| !found.contains(sample)).collect();
+            prop_assert!(missed.is_empty(), "missed {missed:?}");
+            let is_known = |sample: &usize| expected.iter().any(|(other, _)| other == sample);
+            let extra: Vec<_> = found.iter().filter(|sample| !is_known(sample)).collect();
+            prop_assert!(extra.is_empty(), "extra {extra:?}");
+        }
+    }
 }

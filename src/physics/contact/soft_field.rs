@@ -178,15 +178,17 @@ pub(crate) struct SdfCandidate {
     pub(crate) contact: SdfContact,
 }
 
-/// Distance within which a point of speed up to `speed` (m/s) is tested, m.
-fn search_distance(speed: f64, limits: DetectionLimits) -> f64 {
-    limits.reach.max(limits.margin).max(limits.approach_distance(speed))
+/// Distance within which a sample of this spacing (m) and of speed up to `speed` (m/s) is tested, m. It may cover a
+/// face from half a spacing beyond its edge.
+fn search_distance(speed: f64, spacing: f64, limits: DetectionLimits) -> f64 {
+    limits.reach.max(limits.margin).max(limits.approach_distance(speed)) + 0.5 * spacing
 }
 
 /// True if two bodies are close or fast enough for [`detect_soft`] to find anything.
 pub(crate) fn may_touch(a: &FemState, b: &FemState, limits: DetectionLimits) -> bool {
     let (Some(box_a), Some(box_b)) = (Aabb::from_points(&a.x), Aabb::from_points(&b.x)) else { return false };
-    box_a.loosened(search_distance(a.max_speed() + b.max_speed(), limits)).intersects(&box_b)
+    let spacing = a.model.groups.iter().map(|group| group.spacing).fold(0.0, f64::max);
+    box_a.loosened(search_distance(a.max_speed() + b.max_speed(), spacing, limits)).intersects(&box_b)
 }
 
 /// Collects the samples of `body` that press on `field`, or will within the step, into `out`.
@@ -205,27 +207,28 @@ pub(crate) fn detect_soft(
     for (index, group) in body.model.groups.iter().enumerate() {
         let nodes = &group.nodes[..group.count];
         let speed = nodes.iter().map(|&n| body.v[n as usize].norm()).fold(0.0, f64::max) + field_speed;
-        let search_box = around.loosened(search_distance(speed, limits));
+        let search_box = around.loosened(search_distance(speed, group.spacing, limits));
         let Some(group_box) = Aabb::from_points(nodes.iter().map(|&n| &body.x[n as usize])) else { continue };
         if !search_box.intersects(&group_box) {
             continue;
         }
         for sample in group.first..group.last {
-            let Some((candidate, speed)) = test_sample(body, field, &search_box, index, sample) else {
+            let Some((candidate, approach_speed)) = test_sample(body, field, &search_box, index, sample)
+            else {
                 continue;
             };
-            let ahead = limits.margin.max(limits.approach_distance(speed));
-            if candidate.contact.gap < ahead.max(limits.reach) {
+            let contact_distance = limits.margin.max(limits.approach_distance(approach_speed));
+            if candidate.contact.gap < contact_distance.max(limits.reach) {
                 near(index, candidate.contact.element);
             }
-            if candidate.contact.gap < ahead {
+            if candidate.contact.gap < contact_distance {
                 out.push(candidate);
             }
         }
     }
 }
 
-/// The contact of one sample, and its speed against the field's body there, m/s.
+/// The contact of one sample, and its speed towards the field's surface there, m/s.
 fn test_sample(
     body: &FemState,
     field: &DeformedSdf,
@@ -242,9 +245,10 @@ fn test_sample(
     let facing = body.rotation[data.surface.at.element as usize] * data.surface.n_o;
     let contact = field.contact(&p, &facing, data.surface.area.sqrt())?;
     let element = &field.body.model.mesh.elements[contact.element as usize];
-    let approach =
+    let velocity =
         weighted(&body.v, nodes, &data.weights) - weighted(&field.body.v, element, &contact.weights);
-    Some((SdfCandidate { group, sample, p, contact }, approach.norm()))
+    let approach_speed = -velocity.dot(&contact.normal);
+    Some((SdfCandidate { group, sample, p, contact }, approach_speed))
 }
 
 fn weighted(values: &[Vec3], nodes: &[u32], weights: &[f64; 8]) -> Vec3 {

@@ -21,7 +21,7 @@ const STALE_DENSIFICATION: [f64; 2] = [1.2, 0.6];
 /// Curvature of the densification that counts as none in this comparison.
 const SMALL_DENSIFICATION: f64 = 0.05;
 /// Steps for which a node stays retained after its last contact.
-const RETAIN_STEPS: u64 = 10;
+const RETAIN_STEPS: u64 = 4;
 
 /// Coefficients of `A`.
 #[derive(Clone, Copy, Debug, PartialEq)]
