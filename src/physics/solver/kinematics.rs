@@ -3,7 +3,12 @@
 //! An endpoint has *local coordinates*: three velocities per node, or linear and angular velocity of a frame. Points
 //! are linear in them, so gradient and Hessian of a cluster are summed in local coordinates first and scattered once.
 
-use super::problem::{ContactCluster, ContactPoint, ContactProblem, Endpoint};
+use wide::f64x4;
+
+use super::{
+    lanes::{PointPack, Vec3x4},
+    problem::{ContactCluster, ContactPoint, ContactProblem, Endpoint},
+};
 use softvt_geometry::{Mat3, Vec3};
 
 /// Largest number of local coordinates of a cluster: two endpoints of eight nodes.
@@ -35,11 +40,11 @@ fn local_size(end: &Endpoint) -> usize {
 
 /// Velocities of an endpoint's local coordinates, or impulses on them: one vector per node, or the linear and the
 /// angular part of a frame.
-pub(super) type LocalVectors = [Vec3; 8];
+type LocalVectors = [Vec3; 8];
 
 impl ContactProblem {
     /// Velocities of an endpoint's local coordinates.
-    pub(super) fn endpoint_velocities(&self, end: &Endpoint, v: &[f64]) -> LocalVectors {
+    fn endpoint_velocities(&self, end: &Endpoint, v: &[f64]) -> LocalVectors {
         let mut u = [Vec3::zeros(); 8];
         match end {
             Endpoint::Known => {}
@@ -60,78 +65,35 @@ impl ContactProblem {
         u
     }
 
-    /// Velocity of the point at `p` of an endpoint.
-    #[inline]
-    fn point_velocity(&self, end: &Endpoint, u: &LocalVectors, weights: &[f64; 8], p: &Vec3) -> Vec3 {
-        match end {
-            Endpoint::Known => Vec3::zeros(),
-            // Faces have four nodes, voxels eight: with constant counts, the sums are unrolled.
-            Endpoint::Nodes { count: 4, .. } => mean::<4>(u, weights),
-            Endpoint::Nodes { .. } => mean::<8>(u, weights),
-            Endpoint::Frame(frame) => u[0] + u[1].cross(&(p - self.frames[*frame].origin)),
-        }
-    }
-
-    /// The points of a cluster with their relative velocities, where `v` are the velocities of its island.
-    #[inline]
-    pub(super) fn point_velocities<'a>(
-        &'a self,
-        cluster: &'a ContactCluster,
-        v: &[f64],
-    ) -> impl Iterator<Item = (&'a ContactPoint, Vec3)> + use<'a> {
-        let ua = self.endpoint_velocities(&cluster.a, v);
-        let ub = self.endpoint_velocities(&cluster.b, v);
-        self.points[cluster.first..cluster.last].iter().map(move |point| {
-            let on_a = self.point_velocity(&cluster.a, &ua, &point.weights_a, &point.p);
-            (point, on_a - self.point_velocity(&cluster.b, &ub, &point.weights_b, &point.p) - point.drift)
-        })
-    }
-
-    /// Adds an impulse at a point to the impulses on an endpoint's local coordinates: the transpose of
-    /// [`Self::point_velocity`].
-    #[inline]
-    pub(super) fn add_point_impulse(
-        &self,
-        end: &Endpoint,
-        local: &mut LocalVectors,
-        weights: &[f64; 8],
-        p: &Vec3,
-        impulse: &Vec3,
-    ) {
-        match end {
-            Endpoint::Known => {}
-            Endpoint::Nodes { count: 4, .. } => (0..4).for_each(|i| local[i] += impulse * weights[i]),
-            Endpoint::Nodes { .. } => (0..8).for_each(|i| local[i] += impulse * weights[i]),
-            Endpoint::Frame(frame) => {
-                local[0] += impulse;
-                local[1] += (p - self.frames[*frame].origin).cross(impulse);
-            }
+    /// Velocities of the endpoints of a cluster, where `v` are those of its island.
+    pub(super) fn cluster_motion(&self, cluster: &ContactCluster, v: &[f64]) -> ClusterMotion {
+        ClusterMotion {
+            a: EndpointMotion::new(self, &cluster.a, v),
+            b: EndpointMotion::new(self, &cluster.b, v),
         }
     }
 
     /// Adds `sign` times the impulses on an endpoint's local coordinates to the gradient:
     /// the transpose of [`Self::endpoint_velocities`].
-    pub(super) fn scatter_impulses(
-        &self,
-        end: &Endpoint,
-        sign: f64,
-        local: &LocalVectors,
-        gradient: &mut [f64],
-    ) {
+    fn scatter_impulses(&self, end: &Endpoint, sign: f64, lanes: &[Vec3x4; 8], gradient: &mut [f64]) {
+        let local = |i: usize| lanes[i].sum();
         match end {
             Endpoint::Known => {}
             Endpoint::Nodes { block, at, count } => {
-                for (f, at) in local.iter().zip(&at[..*count]) {
+                for (i, at) in at[..*count].iter().enumerate() {
                     let start = self.blocks[*block].offset + *at as usize;
-                    gradient[start..start + 3].iter_mut().zip(f.iter()).for_each(|(g, f)| *g += sign * f);
+                    gradient[start..start + 3]
+                        .iter_mut()
+                        .zip(local(i).iter())
+                        .for_each(|(g, f)| *g += sign * f);
                 }
             }
             Endpoint::Frame(frame) => {
                 let frame = &self.frames[*frame];
-                let start = self.blocks[frame.block].offset;
+                let (start, linear, angular) = (self.blocks[frame.block].offset, local(0), local(1));
                 for (column, g) in frame.jacobian.chunks_exact(6).zip(&mut gradient[start..]) {
-                    let along = Vec3::new(column[0], column[1], column[2]).dot(&local[0]);
-                    *g += sign * (along + Vec3::new(column[3], column[4], column[5]).dot(&local[1]));
+                    let along = Vec3::new(column[0], column[1], column[2]).dot(&linear);
+                    *g += sign * (along + Vec3::new(column[3], column[4], column[5]).dot(&angular));
                 }
             }
         }
@@ -153,9 +115,102 @@ impl ContactProblem {
     }
 }
 
-#[inline]
-fn mean<const N: usize>(u: &LocalVectors, weights: &[f64; 8]) -> Vec3 {
-    (1..N).fold(u[0] * weights[0], |sum, i| sum + u[i] * weights[i])
+/// Motion of an endpoint, of which points take the velocities.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum EndpointMotion {
+    Known,
+    /// Velocities of the four nodes of a face. They are apart from the eight of a voxel, so that the sums are unrolled.
+    Face([Vec3; 4]),
+    Voxel(LocalVectors),
+    Frame {
+        linear: Vec3,
+        angular: Vec3,
+        origin: Vec3,
+    },
+}
+
+impl EndpointMotion {
+    fn new(problem: &ContactProblem, end: &Endpoint, v: &[f64]) -> Self {
+        let u = problem.endpoint_velocities(end, v);
+        match end {
+            Endpoint::Known => Self::Known,
+            Endpoint::Nodes { count: 4, .. } => Self::Face([u[0], u[1], u[2], u[3]]),
+            Endpoint::Nodes { .. } => Self::Voxel(u),
+            Endpoint::Frame(frame) => {
+                Self::Frame { linear: u[0], angular: u[1], origin: problem.frames[*frame].origin }
+            }
+        }
+    }
+
+    /// Velocities of points at `p` with these weights of the nodes.
+    #[inline(always)]
+    fn velocity(&self, weights: &[f64x4; 8], p: Vec3x4) -> Vec3x4 {
+        match self {
+            Self::Known => Vec3x4::default(),
+            Self::Face(u) => weighted_sum(u, weights),
+            Self::Voxel(u) => weighted_sum(u, weights),
+            Self::Frame { linear, angular, origin } => {
+                Vec3x4::splat(linear) + Vec3x4::splat(angular).cross(p - Vec3x4::splat(origin))
+            }
+        }
+    }
+
+    /// Adds impulses at points to the impulses on the local coordinates: the transpose of [`Self::velocity`].
+    #[inline(always)]
+    fn add_impulse(&self, local: &mut [Vec3x4; 8], weights: &[f64x4; 8], p: Vec3x4, impulse: Vec3x4) {
+        match self {
+            Self::Known => {}
+            Self::Face(_) => (0..4).for_each(|i| local[i] += impulse * weights[i]),
+            Self::Voxel(_) => (0..8).for_each(|i| local[i] += impulse * weights[i]),
+            Self::Frame { origin, .. } => {
+                local[0] += impulse;
+                local[1] += (p - Vec3x4::splat(origin)).cross(impulse);
+            }
+        }
+    }
+}
+
+#[inline(always)]
+fn weighted_sum<const N: usize>(u: &[Vec3; N], weights: &[f64x4; 8]) -> Vec3x4 {
+    (1..N).fold(Vec3x4::splat(&u[0]) * weights[0], |sum, i| sum + Vec3x4::splat(&u[i]) * weights[i])
+}
+
+/// Motion of the two endpoints of a cluster.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct ClusterMotion {
+    a: EndpointMotion,
+    b: EndpointMotion,
+}
+
+impl ClusterMotion {
+    /// Relative velocities of a pack of its points.
+    #[inline(always)]
+    pub(super) fn velocities(&self, points: &PointPack) -> Vec3x4 {
+        let on_a = self.a.velocity(&points.weights_a, points.p);
+        on_a - self.b.velocity(&points.weights_b, points.p) - points.drift
+    }
+}
+
+/// Impulses on the local coordinates of the two endpoints of a cluster, by lane of the points.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct ClusterImpulses {
+    a: [Vec3x4; 8],
+    b: [Vec3x4; 8],
+}
+
+impl ClusterImpulses {
+    /// Adds the impulses of a pack of points on `a`; those on `b` are opposite.
+    #[inline(always)]
+    pub(super) fn add(&mut self, motion: &ClusterMotion, points: &PointPack, impulse: Vec3x4) {
+        motion.a.add_impulse(&mut self.a, &points.weights_a, points.p, impulse);
+        motion.b.add_impulse(&mut self.b, &points.weights_b, points.p, impulse);
+    }
+
+    /// Subtracts the impulses on both endpoints from the gradient.
+    pub(super) fn scatter(&self, problem: &ContactProblem, cluster: &ContactCluster, gradient: &mut [f64]) {
+        problem.scatter_impulses(&cluster.a, -1.0, &self.a, gradient);
+        problem.scatter_impulses(&cluster.b, 1.0, &self.b, gradient);
+    }
 }
 
 /// A 3×3 block of the Jacobian from local coordinates to a point.

@@ -1,22 +1,27 @@
 //! Constitutive laws: impulse, cost and curvature of contact points and scalar constraints as
 //! functions of their velocity.
 
-use super::problem::{ContactPoint, ScalarConstraint};
-use softvt_geometry::{Mat3, Vec3};
+use wide::f64x4;
 
-/// Impulse and cost of a contact point at a velocity.
-#[derive(Clone, Copy, Debug)]
+use super::{
+    lanes::{PointPack, Vec3x4},
+    problem::ScalarConstraint,
+};
+use softvt_geometry::Mat3;
+
+/// Impulses and costs of a pack of contact points at their velocities; zero for separated points.
+#[derive(Clone, Copy, Debug, Default)]
 pub(super) struct ContactResponse {
-    /// Impulse on `a`, N s.
-    pub impulse: Vec3,
-    /// Cost, J.
-    pub cost: f64,
-    /// Normal part of the impulse, N s.
-    pub normal: f64,
-    /// True if friction is at its bound.
-    pub is_slipping: bool,
-    /// Stretch `z` of the tangential spring, m.
-    stretch: Vec3,
+    /// Impulses on `a`, N s.
+    pub impulse: Vec3x4,
+    /// Costs, J.
+    pub cost: f64x4,
+    /// Normal parts of the impulses, N s.
+    pub normal: f64x4,
+    /// Mask of the points at which friction is at its bound.
+    pub is_slipping: f64x4,
+    /// Stretch `z` of the tangential springs, m.
+    stretch: Vec3x4,
 }
 
 /// The contact law for one step length.
@@ -35,72 +40,81 @@ impl ContactLaw {
         Self { dt, dt_plus_tau: dt + dissipation_time, inverse: 1.0 / (dt + dissipation_time) }
     }
 
-    /// Response of a point at relative velocity `v`; `None` if the point is separated and carried no normal impulse
+    /// Response of points at relative velocities `v`; `None` if all of them are separated and carried no normal impulse
     /// in the previous pass.
     ///
     /// Normal: the spring at the end of the step with dissipation, `γ = dt k (−gap − (dt + τ) v_n)₊`. Tangent: with
     /// `z = s + (dt + τ) v_t` the spring `−dt k_t z`, cut off at the lagged bound `μ γ_n` (a Huber cost in `z`).
-    #[inline]
-    pub(super) fn contact(&self, point: &ContactPoint, v: &Vec3) -> Option<ContactResponse> {
-        let n = &point.normal;
+    #[inline(always)]
+    pub(super) fn contact(&self, points: &PointPack, v: Vec3x4) -> Option<ContactResponse> {
+        let [dt, dt_plus_tau, inverse] = [self.dt, self.dt_plus_tau, self.inverse].map(f64x4::splat);
+        let (n, bound) = (points.normal, points.friction_bound);
         let vn = n.dot(v);
-        let depth = -point.gap - self.dt_plus_tau * vn;
-        let bound = point.mu * point.previous_normal_impulse;
-        if depth <= 0.0 && bound <= 0.0 {
+        let depth = (-points.gap - dt_plus_tau * vn).fast_max(f64x4::ZERO);
+        let is_bound = bound.simd_gt(f64x4::ZERO);
+        if !(depth.simd_gt(f64x4::ZERO) | is_bound).any() {
             return None;
         }
-        let depth = depth.max(0.0);
-        let normal = self.dt * point.stiffness * depth;
+        let normal = dt * points.stiffness * depth;
         let mut response = ContactResponse {
             impulse: n * normal,
-            cost: 0.5 * normal * depth * self.inverse,
+            cost: f64x4::HALF * normal * depth * inverse,
             normal,
-            is_slipping: false,
-            stretch: Vec3::zeros(),
+            is_slipping: f64x4::ZERO,
+            stretch: Vec3x4::default(),
         };
-        if bound > 0.0 {
-            response.stretch = point.offset + (v - n * vn) * self.dt_plus_tau;
-            self.apply_friction(&mut response, self.dt * point.shear_stiffness, bound);
+        if is_bound.any() {
+            response.stretch = points.offset + (v - n * vn) * dt_plus_tau;
+            self.apply_friction(&mut response, dt * points.shear_stiffness, bound);
         }
         Some(response)
     }
 
-    /// Adds friction: a tangential spring of stiffness `c` (N s/m) whose impulse is at most `bound` (N s).
-    #[inline]
-    fn apply_friction(&self, response: &mut ContactResponse, c: f64, bound: f64) {
-        let z = response.stretch;
-        let square = z.norm_squared();
-        if c * c * square <= bound * bound {
-            response.impulse -= z * c;
-            response.cost += 0.5 * c * square * self.inverse;
-        } else {
-            let size = square.sqrt();
-            response.impulse -= z * (bound / size);
-            response.cost += bound * self.inverse * (size - 0.5 * bound / c);
-            response.is_slipping = true;
-        }
+    /// Adds friction: tangential springs of stiffness `c` (N s/m) whose impulses are at most `bound` (N s).
+    #[inline(always)]
+    fn apply_friction(&self, response: &mut ContactResponse, c: f64x4, bound: f64x4) {
+        let (z, inverse) = (response.stretch, f64x4::splat(self.inverse));
+        let square = z.dot(z);
+        let is_sticking = (c * c * square).simd_le(bound * bound);
+        let size = square.sqrt();
+        response.impulse = response.impulse - z * is_sticking.select(c, bound / size);
+        let sticking_cost = f64x4::HALF * c * square;
+        let slipping_cost = bound * (size - f64x4::HALF * bound / c);
+        response.cost += is_sticking.select(sticking_cost, slipping_cost) * inverse;
+        response.is_slipping = !is_sticking & bound.simd_gt(f64x4::ZERO);
     }
 
-    /// Hessian of the cost with respect to the velocity at a response of this point, kg.
-    pub(super) fn curvature(&self, point: &ContactPoint, response: &ContactResponse) -> Mat3 {
-        let n = &point.normal;
+    /// Hessian of the cost with respect to the velocity of the point in one lane, at a response of its pack, kg; `None`
+    /// for a separated point.
+    pub(super) fn curvature(
+        &self,
+        points: &PointPack,
+        response: &ContactResponse,
+        lane: usize,
+    ) -> Option<Mat3> {
+        let of = |lanes: f64x4| lanes.to_array()[lane];
+        let (is_pressed, bound) = (of(response.normal) > 0.0, of(points.friction_bound));
+        if !is_pressed && bound <= 0.0 {
+            return None;
+        }
+        let n = points.normal.lane(lane);
         let onto_normal = n * n.transpose();
         let mut curvature = Mat3::zeros();
-        if response.normal > 0.0 {
-            curvature = onto_normal * (self.dt * point.stiffness * self.dt_plus_tau);
+        if is_pressed {
+            curvature = onto_normal * (self.dt * of(points.stiffness) * self.dt_plus_tau);
         }
-        let bound = point.mu * point.previous_normal_impulse;
         if bound <= 0.0 {
-            return curvature;
+            return Some(curvature);
         }
         let plane = Mat3::identity() - onto_normal;
-        if response.is_slipping {
-            let size = response.stretch.norm();
-            let direction = response.stretch / size;
+        Some(if response.is_slipping.to_bitmask() >> lane & 1 == 1 {
+            let stretch = response.stretch.lane(lane);
+            let size = stretch.norm();
+            let direction = stretch / size;
             curvature + (plane - direction * direction.transpose()) * (bound * self.dt_plus_tau / size)
         } else {
-            curvature + plane * (self.dt * point.shear_stiffness * self.dt_plus_tau)
-        }
+            curvature + plane * (self.dt * of(points.shear_stiffness) * self.dt_plus_tau)
+        })
     }
 }
 
@@ -165,7 +179,9 @@ impl ScalarConstraint {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::solver::ContactPoint;
     use proptest::prelude::*;
+    use softvt_geometry::Vec3;
 
     fn point(gap: f64, offset: [f64; 2], previous_normal_impulse: f64) -> ContactPoint {
         ContactPoint {
@@ -186,21 +202,29 @@ mod tests {
             v in prop::array::uniform3(-0.1f64..0.1), gap in -1e-3f64..1e-3, offset in prop::array::uniform2(-1e-3f64..1e-3),
             previous_normal_impulse in 0.0f64..5e-3,
         ) {
-            let (law, v, p) = (ContactLaw::new(1.0 / 60.0, 0.01), Vec3::from(v), point(gap, offset, previous_normal_impulse));
-            let open = ContactResponse {
-                impulse: Vec3::zeros(), cost: 0.0, normal: 0.0, is_slipping: false, stretch: Vec3::zeros(),
-            };
-            let response = |v: &Vec3| law.contact(&p, v).unwrap_or(open);
+            let (law, v) = (ContactLaw::new(1.0 / 60.0, 0.01), Vec3::from(v));
+            let separated = point(1.0, [0.0; 2], 0.0);
+            // The second of three points; the fourth lane is empty.
+            let (lane, pack) = (1, PointPack::new(&[separated, point(gap, offset, previous_normal_impulse), separated], [4, 0]));
+            let response = |v: &Vec3| law.contact(&pack, Vec3x4::splat(v)).unwrap_or_default();
             let at = response(&v);
-            let curvature = law.curvature(&p, &at);
+            for other in [0, 2, 3] {
+                let impulse = at.impulse.lane(other);
+                prop_assert!(impulse == Vec3::zeros() && at.cost.to_array()[other] == 0.0, "{at:?}");
+            }
+            let curvature = law.curvature(&pack, &at, lane).unwrap_or_default();
+            let cost = |response: &ContactResponse| response.cost.to_array()[lane];
+            let kind = |response: &ContactResponse| {
+                (response.normal.to_array()[lane] > 0.0, response.is_slipping.to_bitmask() >> lane & 1)
+            };
             let e = 1e-6;
             for i in 0..3 {
                 let moved = |s: f64| response(&(v + Vec3::ith(i, s)));
                 let (up, down) = (moved(e), moved(-e));
-                prop_assert!(((up.cost - down.cost) / (2.0 * e) + at.impulse[i]).abs() < 1e-6);
-                let kink = (up.normal > 0.0) != (down.normal > 0.0) || up.is_slipping != down.is_slipping;
-                let slope = (up.impulse - down.impulse) / (2.0 * e);
-                prop_assert!(kink || (slope + curvature.column(i)).norm() < 1e-3, "{slope} {curvature}");
+                prop_assert!(((cost(&up) - cost(&down)) / (2.0 * e) + at.impulse.lane(lane)[i]).abs() < 1e-6);
+                let slope = (up.impulse - down.impulse).lane(lane) / (2.0 * e);
+                let is_kink = kind(&up) != kind(&down);
+                prop_assert!(is_kink || (slope + curvature.column(i)).norm() < 1e-3, "{slope} {curvature}");
             }
         }
 

@@ -13,6 +13,7 @@
 mod factor;
 mod island;
 mod kinematics;
+mod lanes;
 mod law;
 mod newton;
 mod problem;

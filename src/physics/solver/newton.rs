@@ -7,15 +7,17 @@
 //! them, and each step is solved with the scalar constraints in the state that they will have at its end: a proximal
 //! Newton method (Lee, Sun & Saunders 2014) in which the scalar constraints are the part that is not linearised.
 
+use wide::f64x4;
+
 use super::{
     factor::Precision,
     island::{FactorCache, Island, islands},
-    kinematics::{ClusterHessian, DofMap},
-    law::{ContactLaw, ContactResponse, LinearSegment},
+    kinematics::{ClusterHessian, ClusterImpulses, DofMap},
+    lanes::{IslandPacks, LANES, sum_lanes},
+    law::{ContactLaw, LinearSegment},
     problem::ContactProblem,
 };
 use crate::sparse::{NotPositiveDefinite, dense};
-use softvt_geometry::Vec3;
 
 /// Convergence of the gradient relative to the momenta of the island (both scaled by `diag(A)^-1/2`).
 ///
@@ -40,7 +42,7 @@ const STALE_FACTOR_TRIAL: u32 = 3;
 const SINGLE_FROM: usize = 96;
 /// Slope at the end of a line search, relative to that at its start. Points on the line are cheap: they need no product
 /// with the matrices of the blocks.
-const LINE_TOLERANCE: f64 = 0.1;
+const LINE_TOLERANCE: f64 = 0.3;
 /// Guesses of the active segments of the scalar constraints before the segments at the current velocities are taken.
 const MAX_SEGMENT_GUESSES: usize = 8;
 
@@ -91,8 +93,8 @@ pub(crate) struct Solver {
     stiffness: Vec<f64>,
     local: ClusterHessian,
     map: DofMap,
-    /// Relative velocities of the points of one cluster.
-    velocities: Vec<Vec3>,
+    /// The contact points of the island.
+    packs: IslandPacks,
     factorizations: u32,
 }
 
@@ -145,6 +147,7 @@ impl Solver {
     /// Solves one island; returns the number of Newton steps.
     fn solve_island(&mut self, problem: &mut ContactProblem, island: &Island) -> Result<u32, SolverFailure> {
         self.start(problem, island);
+        self.packs.set(problem, island);
         multiply(problem, island, &self.v, &mut self.product);
         let mut steps = 0;
         for pass in 0..MAX_PASSES {
@@ -160,6 +163,7 @@ impl Solver {
                         point.previous_normal_impulse = point.normal_impulse;
                     }
                 }
+                self.packs.update_bounds(problem, island);
             }
         }
         for &block in &island.blocks {
@@ -189,7 +193,7 @@ impl Solver {
     /// The cost is piecewise quadratic and changes little from step to step, so an existing factor of its Hessian is
     /// used for as long as that is cheaper than a new one. The gradient is always exact.
     fn newton(&mut self, problem: &ContactProblem, island: &Island) -> Result<u32, SolverFailure> {
-        let mut cost = evaluate(problem, island, &self.v, &self.product, &mut self.gradient);
+        let mut cost = evaluate(problem, island, &self.packs, &self.v, &self.product, &mut self.gradient);
         let mut ratio = self.residual_ratio(problem, island);
         let mut has_factor = self.cache.select(problem, island);
         let mut precision = if island.size < SINGLE_FROM { Precision::Double } else { Precision::Single };
@@ -270,13 +274,17 @@ impl Solver {
             }
         }
         let law = ContactLaw::new(problem.dt, problem.dissipation_time);
-        for cluster in island.clusters.iter().map(|&index| &problem.clusters[index]) {
-            let mut is_touched = false;
+        for (cluster, packs) in self.packs.clusters(problem, island) {
+            let (motion, mut is_touched) = (problem.cluster_motion(cluster, &self.v), false);
             self.local.start(cluster);
-            for (point, velocity) in problem.point_velocities(cluster, &self.v) {
-                let Some(response) = law.contact(point, &velocity) else { continue };
+            let points = problem.points[cluster.first..cluster.last].chunks(LANES);
+            for (pack, points) in packs.iter().zip(points) {
+                let Some(response) = law.contact(pack, motion.velocities(pack)) else { continue };
                 is_touched = true;
-                self.local.add(problem, cluster, point, &law.curvature(point, &response));
+                for (lane, point) in points.iter().enumerate() {
+                    let Some(curvature) = law.curvature(pack, &response, lane) else { continue };
+                    self.local.add(problem, cluster, point, &curvature);
+                }
             }
             if is_touched {
                 self.map.set(problem, cluster);
@@ -289,19 +297,23 @@ impl Solver {
     fn write_back(&mut self, problem: &mut ContactProblem, island: &Island) -> PassImpulses {
         let mut impulses = PassImpulses::default();
         let law = ContactLaw::new(problem.dt, problem.dissipation_time);
-        for &index in &island.clusters {
+        for (&index, packs) in island.clusters.iter().zip(self.packs.of_clusters()) {
             let cluster = problem.clusters[index];
-            self.velocities.clear();
-            self.velocities.extend(problem.point_velocities(&cluster, &self.v).map(|(_, velocity)| velocity));
-            for (point, v) in problem.points[cluster.first..cluster.last].iter_mut().zip(&self.velocities) {
-                let response = law.contact(point, v);
-                let normal = response.map_or(0.0, |response| response.normal);
-                impulses.change += (normal - point.previous_normal_impulse).abs();
-                impulses.total += normal;
-                point.normal_impulse = normal;
-                point.shear_impulse = response.map_or(Vec3::zeros(), |a| a.impulse - point.normal * normal);
-                point.is_slipping = response.is_some_and(|response| response.is_slipping);
-                point.velocity = *v;
+            let motion = problem.cluster_motion(&cluster, &self.v);
+            let points = problem.points[cluster.first..cluster.last].chunks_mut(LANES);
+            for (pack, points) in packs.iter().zip(points) {
+                let velocities = motion.velocities(pack);
+                let response = law.contact(pack, velocities).unwrap_or_default();
+                let (normals, slipping) = (response.normal.to_array(), response.is_slipping.to_bitmask());
+                for (lane, point) in points.iter_mut().enumerate() {
+                    let normal = normals[lane];
+                    impulses.change += (normal - point.previous_normal_impulse).abs();
+                    impulses.total += normal;
+                    point.normal_impulse = normal;
+                    point.shear_impulse = response.impulse.lane(lane) - point.normal * normal;
+                    point.is_slipping = slipping >> lane & 1 == 1;
+                    point.velocity = velocities.lane(lane);
+                }
             }
         }
         impulses
@@ -402,7 +414,14 @@ impl Solver {
             self.trial.iter_mut().zip(&self.v).zip(&self.step).for_each(|((t, v), s)| *t = v + at * s);
             let products = self.product.iter().zip(&self.step_product);
             self.trial_product.iter_mut().zip(products).for_each(|(t, (p, s))| *t = p + at * s);
-            value = evaluate(problem, island, &self.trial, &self.trial_product, &mut self.trial_gradient);
+            value = evaluate(
+                problem,
+                island,
+                &self.packs,
+                &self.trial,
+                &self.trial_product,
+                &mut self.trial_gradient,
+            );
             let along: f64 = self.trial_gradient.iter().zip(&self.step).map(|(g, s)| g * s).sum();
             let descends = value <= cost + 1e-4 * at * slope;
             // If the full step still leads downhill, the model is accurate enough to take it.
@@ -443,6 +462,7 @@ fn multiply(problem: &ContactProblem, island: &Island, v: &[f64], product: &mut 
 fn evaluate(
     problem: &ContactProblem,
     island: &Island,
+    packs: &IslandPacks,
     v: &[f64],
     product: &[f64],
     gradient: &mut [f64],
@@ -457,22 +477,21 @@ fn evaluate(
         }
     }
     let law = ContactLaw::new(problem.dt, problem.dissipation_time);
-    for cluster in island.clusters.iter().map(|&index| &problem.clusters[index]) {
-        let (mut on_a, mut on_b, mut is_touched) = ([Vec3::zeros(); 8], [Vec3::zeros(); 8], false);
-        for (point, velocity) in problem.point_velocities(cluster, v) {
-            let Some(ContactResponse { impulse, cost: own, .. }) = law.contact(point, &velocity) else {
-                continue;
-            };
+    let mut contact_cost = f64x4::ZERO;
+    for (cluster, packs) in packs.clusters(problem, island) {
+        let motion = problem.cluster_motion(cluster, v);
+        let (mut impulses, mut is_touched) = (ClusterImpulses::default(), false);
+        for pack in packs {
+            let Some(response) = law.contact(pack, motion.velocities(pack)) else { continue };
             is_touched = true;
-            cost += own;
-            problem.add_point_impulse(&cluster.a, &mut on_a, &point.weights_a, &point.p, &impulse);
-            problem.add_point_impulse(&cluster.b, &mut on_b, &point.weights_b, &point.p, &impulse);
+            contact_cost += response.cost;
+            impulses.add(&motion, pack, response.impulse);
         }
         if is_touched {
-            problem.scatter_impulses(&cluster.a, -1.0, &on_a, gradient);
-            problem.scatter_impulses(&cluster.b, 1.0, &on_b, gradient);
+            impulses.scatter(problem, cluster, gradient);
         }
     }
+    cost += sum_lanes(contact_cost);
     for (at, constraint) in island.scalars(problem) {
         cost += constraint.cost(problem.dt, v[at]);
         gradient[at] -= problem.dt * constraint.force_at(problem.dt, v[at]);
@@ -514,6 +533,7 @@ fn by_bisection(low: LinePoint, high: LinePoint) -> f64 {
 mod tests {
     use super::*;
     use crate::solver::{ContactCluster, ContactPoint, Endpoint, VelocityBlock};
+    use softvt_geometry::Vec3;
 
     /// Mass, kg; friction bound and normal impulse, N s; product of step and tangential stiffness, N s/m.
     const MASS: f64 = 0.05;

@@ -63,6 +63,16 @@ pub(crate) enum Endpoint {
     Frame(usize),
 }
 
+impl Endpoint {
+    /// Number of nodes that points have weights of.
+    pub(super) fn node_count(&self) -> usize {
+        match self {
+            Self::Nodes { count, .. } => *count,
+            Self::Known | Self::Frame(_) => 0,
+        }
+    }
+}
+
 /// Contact points between the same two endpoints.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct ContactCluster {
