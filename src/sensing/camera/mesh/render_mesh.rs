@@ -26,8 +26,9 @@ use softvt_geometry::{
 };
 use softvt_scene::{Visual, VisualLayer};
 
-/// Cells along the longest edge of a shape, per level of detail.
-const CELLS: [f64; 5] = [64.0, 40.0, 26.0, 16.0, 10.0];
+/// Cells along the longest edge of a shape, per level of detail. Neighbours differ by a factor of about 1.25, so that
+/// the level that is drawn is seldom much finer than the image needs.
+const CELLS: [f64; 9] = [64.0, 50.0, 40.0, 32.0, 26.0, 20.0, 16.0, 12.5, 10.0];
 /// Tolerance of the simplification of shapes, in vertex spacings.
 const SIMPLIFY_TOLERANCE: f32 = 0.05;
 /// Maximum edge of the triangles of a simplified soft shape, in voxels of its body: straight edges follow its
@@ -37,9 +38,8 @@ const MAX_SOFT_EDGE: f64 = 1.0 / 3.0;
 const MAX_PATTERN_EDGE: f64 = 1.0 / 48.0;
 /// Maximum number of triangles that subdivision creates.
 const MAX_SUBDIVIDED_TRIANGLES: usize = 120_000;
-/// Geometric errors of the levels of detail of solids, m: for large images, for small ones, and for distant views and
-/// shadows.
-const LOD_ERRORS: [f32; 4] = [1e-4, 2.5e-4, 5e-4, MAX_CASTER_ERROR];
+/// Geometric errors of the levels of detail of solids, m: from large images to distant views and shadows.
+const LOD_ERRORS: [f32; 7] = [1e-4, 1.5e-4, 2.2e-4, 3.2e-4, 4.7e-4, 6.8e-4, MAX_CASTER_ERROR];
 /// Maximum geometric error of the levels of detail that cast shadows, m: half the depth bias of shadow maps, so that
 /// casters do not shade their own surface.
 const MAX_CASTER_ERROR: f32 = 1e-3;

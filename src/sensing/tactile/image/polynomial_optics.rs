@@ -173,9 +173,12 @@ impl LightRow {
     /// Replaces slopes by their sines, limited to `steepest`. Returns the range from the first to the last
     /// pixel with a slope.
     fn slopes_to_sines(&mut self, steepest: f32) -> Option<Range<usize>> {
+        let steepest2 = steepest * steepest;
         for (a, b) in self.a.iter_mut().zip(&mut self.b) {
             let square = *a * *a + *b * *b;
-            let scale = (1.0 / (1.0 + square)).sqrt().min(steepest / square.max(1e-20).sqrt());
+            let is_limited = square > steepest2 * (1.0 + square);
+            let (above, below) = if is_limited { (steepest2, square) } else { (1.0, 1.0 + square) };
+            let scale = (above / below).sqrt();
             (*a, *b) = (*a * scale, *b * scale);
         }
         let steep = |(a, b): (&f32, &f32)| a.abs().max(b.abs()) > MIN_SLOPE;
