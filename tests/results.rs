@@ -117,7 +117,7 @@ fn rows_and_columns_follow_the_runs() {
     );
     assert!(
         tables::overview(&results, &labels, "abcd")
-            .starts_with("Rows that this version has not computed anew")
+            .starts_with("Rows that were not run again with this version")
     );
     // Medians of D/τ 0.5 and 2, of grip ratios 1.5 and 2.5, and of times 4 and 6 s.
     let page = tables::page(&results, &labels, "abcd");

@@ -98,7 +98,7 @@ pub fn overview(results: &[Results], labels: &Value, physics: &str) -> String {
     let cells = results.iter().flat_map(|one| &one.suites).flat_map(|suite| suite["controllers"].as_array());
     let earlier = match cells.flatten().any(|cell| cell["physics"] != physics) {
         true => {
-            "Rows that this version has not computed anew yet are of an earlier one, with other limits of D; \
+            "Rows that were not run again with this version come from an earlier one, in which single episodes can differ; \
                  [docs/results](docs/results/README.md) marks them.\n\n"
         }
         false => "",
