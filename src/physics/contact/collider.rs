@@ -15,8 +15,8 @@ use softvt_geometry::{
 /// The surface of a solid in its own frame, m. [`Shape`] implements it.
 pub trait ContactSurface: Debug + Send + Sync {
     /// Signed distance, outward normal and coverage for a square sample of edge `spacing` (m) at `p`
-    /// with outward normal `facing`. Where the distance is not exact, a positive one below 5 mm must be at most 1.25
-    /// times the true one: samples around one that is far away are not tested.
+    /// with outward normal `facing`. The search for contacts skips samples around one that is far away, so an
+    /// approximate distance of up to 5 mm must not exceed the true one by more than a quarter.
     fn contact(&self, p: &Vec3, facing: &Vec3, spacing: f64) -> SampleContact;
     /// True if a cheap test proves that the solid is more than `reach` (m) away from `p`; false leaves it open.
     fn is_farther(&self, _p: &Vec3, _reach: f64) -> bool {

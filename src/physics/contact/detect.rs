@@ -68,7 +68,7 @@ pub(crate) struct BodyBounds {
     body: Option<Aabb>,
     groups: Vec<Aabb>,
     max_speed: f64,
-    /// Largest spacing of the samples of a group, m.
+    /// Edge of the largest patch of its samples, m.
     max_spacing: f64,
 }
 
@@ -77,7 +77,7 @@ impl BodyBounds {
     pub(crate) fn update(&mut self, body: &FemState) {
         self.body = Aabb::from_points(&body.x);
         self.max_speed = body.max_speed();
-        self.max_spacing = body.model.groups.iter().map(|group| group.spacing).fold(0.0, f64::max);
+        self.max_spacing = body.model.max_spacing();
         self.groups.clear();
         self.groups.extend(body.model.groups.iter().map(|group| {
             let first = body.x[group.nodes[0] as usize];
@@ -341,6 +341,8 @@ mod tests {
             let (mut bounds, mut found, mut near) = (BodyBounds::default(), Vec::new(), Vec::new());
             bounds.update(&BODY);
             detect(&BODY, &bounds, &collider, &motion, LIMITS, &mut found, &mut |group| near.push(group));
+            let touching_groups = found.iter().filter(|candidate| candidate.gap < LIMITS.reach);
+            prop_assert!(touching_groups.map(|candidate| candidate.group).all(|group| near.contains(&group)));
             let found: Vec<_> = found.iter().map(|candidate| candidate.sample).collect();
             let expected = by_all_samples(&BODY, &collider, &motion);
             // Distances are approximate far from a surface, and differ from the gap where two faces meet.

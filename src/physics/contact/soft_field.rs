@@ -187,8 +187,8 @@ fn search_distance(speed: f64, spacing: f64, limits: DetectionLimits) -> f64 {
 /// True if two bodies are close or fast enough for [`detect_soft`] to find anything.
 pub(crate) fn may_touch(a: &FemState, b: &FemState, limits: DetectionLimits) -> bool {
     let (Some(box_a), Some(box_b)) = (Aabb::from_points(&a.x), Aabb::from_points(&b.x)) else { return false };
-    let spacing = a.model.groups.iter().map(|group| group.spacing).fold(0.0, f64::max);
-    box_a.loosened(search_distance(a.max_speed() + b.max_speed(), spacing, limits)).intersects(&box_b)
+    let distance = search_distance(a.max_speed() + b.max_speed(), a.model.max_spacing(), limits);
+    box_a.loosened(distance).intersects(&box_b)
 }
 
 /// Collects the samples of `body` that press on `field`, or will within the step, into `out`.

@@ -163,6 +163,11 @@ impl FemModel {
         })
     }
 
+    /// Edge of the largest patch of all samples, m.
+    pub(crate) fn max_spacing(&self) -> f64 {
+        self.groups.iter().map(|group| group.spacing).fold(0.0, f64::max)
+    }
+
     /// Total mass, kg.
     pub fn total_mass(&self) -> f64 {
         self.mass.iter().sum()
