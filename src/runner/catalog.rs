@@ -1,14 +1,15 @@
 //! What there is to run, in the working folder and in the library of the binary: suites, tasks, assets, policies,
 //! profiles and settings, one JSON object each.
 
-use std::{collections::BTreeSet, path::Path};
+use std::{collections::BTreeSet, convert::Infallible, path::Path};
 
 use serde_json::{Value, json};
 
-use crate::{error::RunError, policy::BuiltinPolicy};
+use crate::{config::thread_count, error::RunError, policy::BuiltinPolicy};
 use softvt_benchmark::{Plan, Task, settings::Settings};
-use softvt_common::settings::Setting;
+use softvt_common::{parallel, settings::Setting};
 use softvt_policy::profile::PROFILES;
+use softvt_script::{LoadedScript, ScriptError};
 
 /// Rows of all files that can be loaded, and why the others cannot.
 pub struct Listing {
@@ -135,12 +136,16 @@ fn scripts(folder: &str) -> BTreeSet<String> {
 }
 
 fn list_plans(rows_of: impl Fn(&str, &Plan) -> Vec<Value>) -> Listing {
+    let paths: Vec<String> = scripts("suites").into_iter().collect();
     let mut listing = Listing::from(Vec::new());
-    for path in scripts("suites") {
-        match softvt_script::load(Path::new(&path), &[]) {
-            Ok(loaded) => listing.rows.extend(rows_of(&path, &loaded.plan)),
+    let load = |file: usize| Ok(softvt_script::load(Path::new(&paths[file]), &[]));
+    let add = |file: usize, loaded: Result<LoadedScript, ScriptError>| {
+        match loaded {
+            Ok(loaded) => listing.rows.extend(rows_of(&paths[file], &loaded.plan)),
             Err(error) => listing.errors.push(error.into()),
         }
-    }
+        Ok::<_, Infallible>(())
+    };
+    let Ok(()) = parallel::run_in_order(paths.len(), thread_count(None), || false, load, add);
     listing
 }

@@ -5,7 +5,7 @@ use std::{
     fs,
     io::{self, Read},
     path::{Path, PathBuf},
-    sync::{Arc, Mutex},
+    sync::{Arc, LazyLock, Mutex},
 };
 
 use include_dir::{Dir, include_dir};
@@ -17,12 +17,33 @@ use super::{
 };
 use softvt_common::text::{hex, suggest};
 
-/// The embedded folders, by their names in the repository.
-static EMBEDDED: [(&str, Dir<'_>); 3] = [
-    ("scripts", include_dir!("$CARGO_MANIFEST_DIR/../../scripts")),
-    ("suites", include_dir!("$CARGO_MANIFEST_DIR/../../suites")),
-    ("assets", include_dir!("$CARGO_MANIFEST_DIR/../../assets")),
-];
+/// Contents of the embedded files by their paths in the repository.
+static EMBEDDED: LazyLock<BTreeMap<String, &'static [u8]>> = LazyLock::new(|| {
+    static FOLDERS: [(&str, Dir<'_>); 3] = [
+        ("scripts", include_dir!("$CARGO_MANIFEST_DIR/../../scripts")),
+        ("suites", include_dir!("$CARGO_MANIFEST_DIR/../../suites")),
+        ("assets", include_dir!("$CARGO_MANIFEST_DIR/../../assets")),
+    ];
+    fn collect(root: &str, dir: &'static Dir<'_>, files: &mut BTreeMap<String, &'static [u8]>) {
+        for file in dir.files() {
+            files.insert(format!("{root}/{}", display(file.path())), file.contents());
+        }
+        dir.dirs().for_each(|inner| collect(root, inner, files));
+    }
+    let mut files = BTreeMap::new();
+    FOLDERS.iter().for_each(|(root, dir)| collect(root, dir, &mut files));
+    files
+});
+
+/// The embedded scripts with limits or materials of objects.
+static HIDDEN: LazyLock<BTreeMap<&str, &[u8]>> = LazyLock::new(|| {
+    let hidden = EMBEDDED.iter().filter(|(path, _)| is_script(path) && is_hidden_path(Path::new(path)));
+    hidden.map(|(path, bytes)| (path.as_str(), *bytes)).collect()
+});
+
+fn is_script(path: &str) -> bool {
+    path.ends_with(".lua")
+}
 
 /// Requests that may fail in one script.
 const MAX_REFUSED: usize = 1000;
@@ -212,12 +233,7 @@ impl Library {
 
     /// True if a hidden file of the embedded library or below the roots has this content.
     fn is_copy_of_hidden(&self, bytes: &[u8]) -> bool {
-        let known: Vec<String> = ["scripts", "assets"]
-            .into_iter()
-            .flat_map(embedded_scripts)
-            .filter(|path| is_hidden_path(Path::new(path)))
-            .collect();
-        if known.iter().any(|path| embedded(path) == Some(bytes)) {
+        if HIDDEN.values().any(|hidden| *hidden == bytes) {
             return true;
         }
         let is_same = |path: PathBuf| {
@@ -227,7 +243,7 @@ impl Library {
         self.roots.iter().any(|root| {
             let assets = fs::read_dir(root.join("assets")).into_iter().flatten().flatten();
             let assets = assets.map(|entry| entry.path());
-            assets.chain(known.iter().map(|path| root.join(path))).any(is_same)
+            assets.chain(HIDDEN.keys().map(|path| root.join(path))).any(is_same)
         })
     }
 
@@ -344,28 +360,17 @@ fn folder_of(path: &Path) -> PathBuf {
     path.parent().filter(|folder| *folder != Path::new("")).unwrap_or(Path::new(".")).to_path_buf()
 }
 
-/// Text of a file of the embedded library by its path in the repository (`suites/…`, `scripts/…`, `assets/…`).
+/// Content of a file of the embedded library by its path in the repository (`suites/…`, `scripts/…`, `assets/…`).
 pub fn embedded(path: &str) -> Option<&'static [u8]> {
-    let (tree, rest) = path.split_once('/')?;
-    let (_, dir) = EMBEDDED.iter().find(|(name, _)| *name == tree)?;
-    dir.get_file(rest).map(include_dir::File::contents)
+    // Without doubled separators and dots.
+    let plain: PathBuf = Path::new(path).components().collect();
+    EMBEDDED.get(&display(&plain)).copied()
 }
 
 /// Paths of the embedded Lua files of a tree (`suites`, `scripts` or `assets`, or a folder of one), sorted.
 pub fn embedded_scripts(tree: &str) -> Vec<String> {
-    fn collect(root: &str, dir: &Dir<'_>, paths: &mut Vec<String>) {
-        let files = dir.files().filter_map(|file| file.path().to_str());
-        paths.extend(files.filter(|path| path.ends_with(".lua")).map(|path| format!("{root}/{path}")));
-        dir.dirs().for_each(|inner| collect(root, inner, paths));
-    }
-    let (root, folder) = tree.split_once('/').map_or((tree, None), |(root, folder)| (root, Some(folder)));
-    let whole = EMBEDDED.iter().find(|(name, _)| *name == root).map(|(_, dir)| dir);
-    let mut paths = Vec::new();
-    if let Some(dir) = whole.and_then(|whole| folder.map_or(Some(whole), |folder| whole.get_dir(folder))) {
-        collect(root, dir, &mut paths);
-    }
-    paths.sort();
-    paths
+    let folder = format!("{tree}/");
+    EMBEDDED.keys().filter(|path| path.starts_with(&folder) && is_script(path)).cloned().collect()
 }
 
 /// Names by which the embedded Lua files of a tree are required.
@@ -414,7 +419,7 @@ fn missing(main: &Path, name: &str) -> ScriptError {
         ["scripts", "suites"].iter().flat_map(|tree| embedded_scripts(tree)).collect();
     let folders = [folder_of(main), Path::new("suites").to_owned()];
     let entries = folders.iter().filter_map(|folder| fs::read_dir(folder).ok()).flatten().flatten();
-    known.extend(entries.map(|e| display(&e.path())).filter(|n| n.ends_with(".lua")));
+    known.extend(entries.map(|e| display(&e.path())).filter(|n| is_script(n)));
     let error = ScriptError::new(name, "no such file");
     // Folders and endings are alike, and would make distant names close.
     let stem = |path: &str| {
