@@ -179,10 +179,19 @@ pub fn standard_normal(rng: &mut ChaCha8Rng) -> f64 {
     radius * (std::f64::consts::TAU * uniform(rng)).cos()
 }
 
-/// Roughly standard normal, from one number of the generator, for noise of many values: a binomial number of 48 trials
-/// and a uniform one in between. Mean 0, variance 1, never beyond 7.1.
-pub fn rough_normal(rng: &mut ChaCha8Rng) -> f64 {
-    let bits = rng.next_u64();
+/// Fills `out` with roughly standard normal numbers, each from one number of the generator, for noise of many values:
+/// a binomial number of 48 trials and a uniform one in between. Mean 0, variance 1, never beyond 7.1.
+pub fn rough_normals(rng: &mut ChaCha8Rng, out: &mut [f64]) {
+    // The second loop is vectorised, the first one cannot be.
+    let mut numbers = [0; 64];
+    for chunk in out.chunks_mut(numbers.len()) {
+        let numbers = &mut numbers[..chunk.len()];
+        numbers.iter_mut().for_each(|number| *number = rng.next_u64());
+        chunk.iter_mut().zip(numbers).for_each(|(normal, bits)| *normal = rough_normal(*bits));
+    }
+}
+
+fn rough_normal(bits: u64) -> f64 {
     let count = (bits >> 16).count_ones();
     let fraction = f64::from(bits as u16) / f64::from(u16::MAX);
     // Variances: 48 / 4 and 1 / 12.
@@ -257,9 +266,11 @@ mod tests {
 
     #[test]
     fn normal_draws_have_mean_zero_and_variance_one() {
-        for normal in [standard_normal, rough_normal] {
-            let mut rng = keyed_rng(&["test"]);
-            let draws: Vec<f64> = (0..20_000).map(|_| normal(&mut rng)).collect();
+        let mut rough = vec![0.0; 20_000];
+        rough_normals(&mut keyed_rng(&["test"]), &mut rough);
+        let mut rng = keyed_rng(&["test"]);
+        let standard = (0..20_000).map(|_| standard_normal(&mut rng)).collect();
+        for draws in [standard, rough] {
             let mean = draws.iter().sum::<f64>() / draws.len() as f64;
             let variance = draws.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / draws.len() as f64;
             assert!(mean.abs() < 0.03 && (variance - 1.0).abs() < 0.04, "{mean} {variance}");
@@ -268,6 +279,19 @@ mod tests {
                 let below = draws.iter().filter(|draw| **draw < limit).count() as f64 / draws.len() as f64;
                 assert!((below - share).abs() < 0.01, "{below} below {limit}");
             }
+        }
+    }
+
+    #[test]
+    fn rough_normals_do_not_depend_on_how_many_are_drawn_at_once() {
+        let mut at_once = [0.0; 200];
+        rough_normals(&mut keyed_rng(&["test"]), &mut at_once);
+        let [mut rng, mut numbers] = [(), ()].map(|()| keyed_rng(&["test"]));
+        for chunk in at_once.chunks(9) {
+            let mut few = vec![0.0; chunk.len()];
+            rough_normals(&mut rng, &mut few);
+            assert_eq!(few, chunk);
+            assert!(few.iter().all(|normal| *normal == rough_normal(numbers.next_u64())));
         }
     }
 

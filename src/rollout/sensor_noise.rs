@@ -5,11 +5,14 @@
 //! of the episode, so a reading does not depend on when or how often it is computed.
 
 use softvt_benchmark::seed::{
-    EpisodeSeed, RandomStream, keyed_rng, rough_normal, standard_normal, uniform, uniform_integer,
+    EpisodeSeed, RandomStream, keyed_rng, rough_normals, standard_normal, uniform, uniform_integer,
 };
 use softvt_robot::tactile::WearSpec;
 use softvt_robot::{Side, WidthSensorSpec, gripper::MAX_WIDTH};
 use softvt_sensing::tactile::TactileReading;
+
+/// Number of colour values whose noise is drawn at once.
+const NOISE_CHUNK: usize = 256;
 
 /// Seed of the sensor errors of an episode.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -69,10 +72,16 @@ impl SensorSeed {
             return;
         }
         let mut noise = keyed_rng(&["softvt tactile image noise", &seed, &side, &step]);
-        for (value, untouched) in reading.image.iter_mut().zip(untouched) {
-            let untouched = f64::from(*untouched);
-            let level = untouched + spec.gain * (f64::from(*value) - untouched);
-            *value = (level + spec.image_noise * rough_normal(&mut noise)).round().clamp(0.0, 255.0) as u8;
+        let mut normals = [0.0; NOISE_CHUNK];
+        let chunks = reading.image.chunks_mut(NOISE_CHUNK).zip(untouched.chunks(NOISE_CHUNK));
+        for (values, untouched) in chunks {
+            let normals = &mut normals[..values.len()];
+            rough_normals(&mut noise, normals);
+            for ((value, untouched), normal) in values.iter_mut().zip(untouched).zip(normals) {
+                let untouched = f64::from(*untouched);
+                let level = untouched + spec.gain * (f64::from(*value) - untouched);
+                *value = (level + spec.image_noise * *normal).round().clamp(0.0, 255.0) as u8;
+            }
         }
     }
 }
