@@ -362,9 +362,7 @@ fn folder_of(path: &Path) -> PathBuf {
 
 /// Content of a file of the embedded library by its path in the repository (`suites/…`, `scripts/…`, `assets/…`).
 pub fn embedded(path: &str) -> Option<&'static [u8]> {
-    // Without doubled separators and dots.
-    let plain: PathBuf = Path::new(path).components().collect();
-    EMBEDDED.get(&display(&plain)).copied()
+    EMBEDDED.get(path).copied()
 }
 
 /// Paths of the embedded Lua files of a tree (`suites`, `scripts` or `assets`, or a folder of one), sorted.
