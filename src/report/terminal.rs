@@ -287,9 +287,10 @@ fn resolution(scores: &GroupScores) -> String {
     let wide = if n < FEW_EPISODES { format!("n = {n}: intervals are wide; ") } else { String::new() };
     match DetectableDifference::new((0.01 * rate.rate.unwrap_or(0.0) * n as f64).round() as usize, n) {
         Some(DetectableDifference { smallest, .. }) => {
-            format!("{wide}{} tell policies apart from {smallest:.0} points on", counted(n, "episode"))
+            let (episodes, points) = (counted(n, "episode"), significant(smallest, 2));
+            format!("{wide}{episodes} distinguish policies that differ by at least {points} points")
         }
-        None => format!("{wide}telling policies apart takes at least {MIN_DISCORDANT}"),
+        None => format!("{wide}distinguishing policies takes at least {MIN_DISCORDANT} episodes"),
     }
 }
 

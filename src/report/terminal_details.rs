@@ -1,7 +1,7 @@
 //! The figures of a run that the terminal shows with `--details`.
 
 use super::styled_text::{Emphasis, StyledText};
-use softvt_common::text::{counted, decimal};
+use softvt_common::text::{counted, decimal, significant};
 use softvt_evaluation::{
     safety::KAPPAS,
     statistics::{Distribution, Rate},
@@ -23,7 +23,8 @@ pub(super) fn push_details(text: &mut StyledText, summary: &SuiteSummary) {
     if let Some(DetectableDifference { smallest, found }) =
         DetectableDifference::new(safe as usize, scores.episodes)
     {
-        let found = format!("{smallest:.0} points; in 4 of 5 cases {found:.0}");
+        let [smallest, found] = [smallest, found].map(|points| significant(points, 2));
+        let found = format!("{smallest} points; in 4 of 5 cases {found}");
         push_named(text, "Detectable difference", &found);
     }
     text.end();
