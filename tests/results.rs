@@ -1,4 +1,4 @@
-//! The published tables of results are those of the committed summaries.
+//! The published tables of results and rates are those of the committed files.
 
 #[path = "../examples/results/collected.rs"]
 mod collected;
@@ -19,7 +19,8 @@ fn the_published_tables_are_those_of_the_summaries() {
         (collected::read(root).expect("summaries"), collected::labels(root).expect("labels"));
     let physics = collected::physics(root).expect("a golden state");
     let readme = fs::read_to_string(root.join("README.md")).expect("a README");
-    let expected = tables::written(&readme, &results, &labels, &physics);
+    let rates = collected::rates(root).expect("rates");
+    let expected = tables::written(&readme, &results, &labels, &physics, &rates);
     let expected = expected.expect("a place for the tables");
     assert_eq!(readme, expected, "run .ci/regenerate results");
     let page = fs::read_to_string(root.join(tables::PAGE)).expect("a page");

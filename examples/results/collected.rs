@@ -54,6 +54,11 @@ pub fn physics(root: &Path) -> Result<String, String> {
     text(&json_of(&path)?, "state_hash", &path)
 }
 
+/// The published rates, as `softvt bench --out` writes them.
+pub fn rates(root: &Path) -> Result<Value, String> {
+    json_of(&root.join("assets/rates.json"))
+}
+
 /// Adds the runs of a folder, made with the physics of this version, to the summaries of its script.
 ///
 /// # Errors

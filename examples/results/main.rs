@@ -3,7 +3,8 @@
 //! Each folder is the output of `softvt SCRIPT --out FOLDER`: of conditions (`suites/controllers.lua`), of a list of
 //! suites (`suites/all.lua`), or of one suite. The results of its runs replace those of the same suites and controllers
 //! in `docs/results/SCRIPT.json`, which are committed; to drop others, delete that file first. Then the tables in
-//! README.md and `docs/results/README.md` are written anew from these files, also without any folder.
+//! README.md and `docs/results/README.md` are written anew from these files, also without any folder, and the rates in
+//! README.md from `assets/rates.json`.
 
 mod collected;
 mod tables;
@@ -19,7 +20,8 @@ fn main() -> Result<(), String> {
     let (results, labels, physics) =
         (collected::read(root)?, collected::labels(root)?, collected::physics(root)?);
     let readme = fs::read_to_string("README.md").map_err(|error| format!("README.md: {error}"))?;
-    write("README.md", &tables::written(&readme, &results, &labels, &physics)?)?;
+    let rates = collected::rates(root)?;
+    write("README.md", &tables::written(&readme, &results, &labels, &physics, &rates)?)?;
     write(tables::PAGE, &tables::page(&results, &labels, &physics))
 }
 

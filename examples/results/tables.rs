@@ -8,22 +8,50 @@ use crate::collected::Results;
 /// The file with all columns.
 pub const PAGE: &str = "docs/results/README.md";
 
-/// Names of the marked parts of the README: the table of its first screen, and those of all results.
+/// Names of the marked parts of the README: the table of its first screen, those of all results, and the rates.
 const FIRST_SCREEN: &str = "verdicts";
 const ALL: &str = "results";
+const RATES: &str = "rates";
 /// Script of the runs on the first screen.
 const FIRST_SCRIPT: &str = "suites/hidden.lua";
 /// Controllers on the first screen above and below the bound without touch.
 const ABOVE_BOUND: [&str; 3] = ["expert", "tactile-servo", "look-retry"];
 const BELOW_BOUND: [&str; 1] = ["expert-binary"];
 
-/// The README with new tables, if it has places for them.
+/// The README with new tables and rates, if it has places for them.
 ///
 /// # Errors
 /// If it does not have the lines around a part once each.
-pub fn written(readme: &str, results: &[Results], labels: &Value, physics: &str) -> Result<String, String> {
+pub fn written(
+    readme: &str,
+    results: &[Results],
+    labels: &Value,
+    physics: &str,
+    rates: &Value,
+) -> Result<String, String> {
     let readme = replaced(readme, FIRST_SCREEN, &first_screen(results, labels))?;
-    replaced(&readme, ALL, &overview(results, labels, physics))
+    let readme = replaced(&readme, ALL, &overview(results, labels, physics))?;
+    replaced(&readme, RATES, &rates_sentence(rates))
+}
+
+/// Observations per second of one core and of the machine, of which an episode has 20 per simulated second.
+fn rates_sentence(rates: &Value) -> String {
+    let rate = |streams: &str| {
+        let rows = rates["streams"].as_array().into_iter().flatten();
+        let row = rows.into_iter().find(|row| row["streams"] == streams);
+        row.and_then(|row| row["observations_per_s"].as_f64()).unwrap_or_default()
+    };
+    let (all, state) = (rate("all streams"), rate("state"));
+    format!(
+        "One core of an {} makes {all:.0} observations per second with every sensor ({:.1} times real time), and {state:.0} of the robot's \
+         state alone ({:.1} times).\n{} threads make {:.0} with every sensor. `softvt bench` measures a machine \
+         ([docs/performance.md](docs/performance.md)).\n",
+        rates["machine"].as_str().unwrap_or_default(),
+        all / 20.0,
+        state / 20.0,
+        rates["threads"],
+        rates["observations_per_s"].as_f64().unwrap_or_default(),
+    )
 }
 
 /// The README with a new part of a name.
