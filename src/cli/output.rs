@@ -2,6 +2,7 @@
 
 use std::{
     collections::BTreeMap,
+    fmt,
     fs::File,
     io::{self, IsTerminal, Read, Write},
     path::Path,
@@ -14,11 +15,11 @@ use std::{
 };
 
 use console::Term;
-use indicatif::{ProgressBar, ProgressStyle};
+use indicatif::{HumanDuration, ProgressBar, ProgressState, ProgressStyle};
 
 use crate::error::CliError;
 use softvt_common::{
-    files::FileError,
+    files::{FileError, check_creatable},
     parallel::lock,
     text::{self, counted},
 };
@@ -150,10 +151,11 @@ impl OutputFormat {
     }
 }
 
-/// Checks before the work that the file of `flag` replaces nothing but a file of its format.
+/// Checks before the work that the file of `flag` can be written and replaces nothing but a file of its format.
 ///
 /// # Errors
-/// Its name has another ending than those of the format, or another file or a folder has the name.
+/// Its name has another ending than those of the format, another file or a folder has the name, or its folder is
+/// read-only.
 pub(crate) fn check_output_file(flag: &str, path: &Path, format: OutputFormat) -> Result<(), CliError> {
     let file = path.display();
     if let Some(extension) = format.extension()
@@ -161,9 +163,8 @@ pub(crate) fn check_output_file(flag: &str, path: &Path, format: OutputFormat) -
     {
         return Err(CliError::input(format!("{flag} {file}: give a file that ends in .{extension}")));
     }
-    // Of a path that leads through a file, the system says so when it is written.
     if !path.exists() {
-        return Ok(());
+        return Ok(check_creatable(path)?);
     }
     let mut first = Vec::new();
     if path.is_file() {
@@ -172,7 +173,7 @@ pub(crate) fn check_output_file(flag: &str, path: &Path, format: OutputFormat) -
     }
     // Empty files, such as those of mktemp, hold nothing to lose.
     if path.is_file() && (first.is_empty() || format.begins_with(&first)) {
-        return Ok(());
+        return Ok(check_creatable(path)?);
     }
     let name = format.name();
     Err(CliError::input(format!("{flag} {file}: it exists and is no {name} file; give another name")))
@@ -227,6 +228,25 @@ impl Drop for Activity {
     }
 }
 
+/// Sets what a bar shows: nothing about jobs before their number is known, and no time left before the first has ended.
+fn set_bar_style(bar: &ProgressBar) {
+    let template = match bar.length() {
+        None | Some(0) => "{prefix}  {elapsed} elapsed  {wide_msg}",
+        Some(_) => "{prefix} {bar:10} {pos}/{len}  {elapsed} elapsed{left}  {wide_msg}",
+    };
+    if let Ok(style) = ProgressStyle::with_template(template) {
+        bar.set_style(style.with_key("left", write_time_left));
+    }
+}
+
+/// Writes the time left, after a comma.
+fn write_time_left(state: &ProgressState, out: &mut dyn fmt::Write) {
+    if state.pos() > 0 {
+        // Writing to memory does not fail.
+        let _ = write!(out, ", {:#} left", HumanDuration(state.eta()));
+    }
+}
+
 /// Progress of a list of jobs on standard error: a bar on a terminal, which disappears
 /// when this is dropped, and one line per job elsewhere.
 pub(crate) struct Progress {
@@ -242,12 +262,8 @@ pub(crate) struct Progress {
 impl Progress {
     pub(crate) fn new(total: usize, what: &str) -> Self {
         let bar = std::io::stderr().is_terminal().then(|| {
-            let bar = ProgressBar::new(total as u64);
-            let template =
-                format!("{what} {{bar:10}} {{pos}}/{{len}}  {{elapsed}} elapsed, {{eta}} left  {{wide_msg}}");
-            if let Ok(style) = ProgressStyle::with_template(&template) {
-                bar.set_style(style);
-            }
+            let bar = ProgressBar::new(total as u64).with_prefix(what.to_owned());
+            set_bar_style(&bar);
             bar.enable_steady_tick(TICK);
             bar
         });
@@ -258,7 +274,10 @@ impl Progress {
     /// There are `count` more jobs.
     pub(crate) fn expect(&mut self, count: usize) {
         self.total += count;
-        self.bar.iter().for_each(|bar| bar.inc_length(count as u64));
+        if let Some(bar) = &self.bar {
+            bar.inc_length(count as u64);
+            set_bar_style(bar);
+        }
     }
 
     /// Counts an episode.

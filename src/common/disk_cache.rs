@@ -5,15 +5,19 @@
 //! written under another name and renamed, and their checksum is verified when they are read. Whatever is wrong with
 //! the folder, values are computed.
 //!
+//! When all are too large, entries that were never read are removed before those that were, as in a segmented LRU cache
+//! (Karedla, Love and Wherry, 1994): a run with hundreds of instances writes many values that no other run needs.
+//!
 //! The cache crates keep values by a key in one file or database, which one damaged page or one process with a lock
 //! makes unusable for all.
 
 use std::{
     fs::{self, File, OpenOptions},
+    hash::{BuildHasher, RandomState},
     io::{self, Read, Write},
     path::{Path, PathBuf},
     sync::{
-        Arc, Mutex, OnceLock,
+        Arc, LazyLock, Mutex, OnceLock,
         atomic::{AtomicU64, Ordering},
     },
     time::{Duration, Instant, SystemTime},
@@ -35,7 +39,10 @@ const PARTIAL: &str = "part";
 /// Values that are computed faster than this are not stored.
 const MIN_TIME: Duration = Duration::from_millis(1);
 /// Interval at which the time of the last use of an entry is updated.
-const USE_INTERVAL: Duration = Duration::from_secs(3600);
+const USE_INTERVAL: Duration = Duration::from_secs(60);
+/// Time since the last use that a new entry begins with: until it is read, it is removed before those that were read
+/// more recently.
+const UNREAD_AGE: Duration = Duration::from_secs(24 * 3600);
 /// Age from which an unfinished file belongs to a process that was killed.
 const STALE_AGE: Duration = Duration::from_secs(3600);
 /// Share of the limit that remains when entries are removed.
@@ -93,8 +100,9 @@ impl DiskCache {
     /// Stores nothing.
     pub const DISABLED: Self = Self(None);
 
-    /// A cache in a folder, which is created with the first entry. The least recently used entries are removed when all
-    /// are larger than `limit` bytes. `report` is told at most once that the folder cannot be used.
+    /// A cache in a folder, which is created with the first entry. Those that were never read, then the least recently
+    /// used entries are removed when all are larger than `limit` bytes. `report` is told at most once that the folder
+    /// cannot be used.
     pub fn new(folder: impl Into<PathBuf>, limit: u64, report: fn(&str)) -> Self {
         let state = Mutex::default();
         Self(Some(Arc::new(CacheFolder { path: folder.into(), limit, report, state })))
@@ -105,12 +113,18 @@ impl DiskCache {
         let _ = OF_PROCESS.set(self);
     }
 
+    /// True if it is in use: not [disabled](Self::DISABLED), and nothing has failed.
+    pub fn is_in_use(&self) -> bool {
+        self.0.as_ref().is_some_and(|folder| !lock(&folder.state).has_failed) && code_version().is_some()
+    }
+
     /// Key of a value of this kind; `inputs` is all it depends on beside the code. `None` if nothing is stored.
     pub fn key(&self, kind: &'static str, inputs: &impl Serialize) -> Option<CacheKey> {
         self.0.as_ref()?;
+        let code = code_version()?;
         let inputs = postcard::to_allocvec(inputs).ok()?;
         let mut hash = Sha256::new();
-        for part in [code_version().as_bytes(), kind.as_bytes(), &inputs] {
+        for part in [code.as_bytes(), kind.as_bytes(), &inputs] {
             hash.update((part.len() as u64).to_le_bytes());
             hash.update(part);
         }
@@ -212,22 +226,22 @@ impl CacheFolder {
 }
 
 /// What the values of a key depend on beside their inputs: the code. The executable stands for it, since its version is
-/// the same while it is being changed.
-fn code_version() -> &'static str {
-    static VERSION: OnceLock<String> = OnceLock::new();
-    VERSION.get_or_init(|| {
-        let file = std::env::current_exe().and_then(fs::metadata);
-        let modified = file.as_ref().ok().and_then(|file| file.modified().ok());
-        let age = modified.and_then(|time| time.duration_since(SystemTime::UNIX_EPOCH).ok());
-        format!(
+/// the same while it is being changed. `None` if the executable cannot be found.
+fn code_version() -> Option<&'static str> {
+    static VERSION: OnceLock<Option<String>> = OnceLock::new();
+    let version = VERSION.get_or_init(|| {
+        let file = std::env::current_exe().and_then(fs::metadata).ok()?;
+        let age = file.modified().ok()?.duration_since(SystemTime::UNIX_EPOCH).ok()?;
+        Some(format!(
             "{} {FORMAT} {} {} {} {}",
             env!("CARGO_PKG_VERSION"),
             std::env::consts::OS,
             std::env::consts::ARCH,
-            file.map_or(0, |file| file.len()),
-            age.unwrap_or_default().as_nanos()
-        )
-    })
+            file.len(),
+            age.as_nanos()
+        ))
+    });
+    version.as_deref()
 }
 
 fn checksum(content: &[u8]) -> [u8; 32] {
@@ -254,16 +268,20 @@ fn read_entry(path: &Path) -> io::Result<Option<Vec<u8>>> {
 /// Writes an entry under another name and renames it. It need not survive a power failure: its checksum would tell.
 fn write_entry(folder: &Path, name: &str, content: &[u8]) -> io::Result<()> {
     static COUNT: AtomicU64 = AtomicU64::new(0);
+    /// Processes in two containers can have one id.
+    static PROCESS: LazyLock<u64> = LazyLock::new(|| RandomState::new().hash_one(std::process::id()));
     fs::create_dir_all(folder)?;
     let number = COUNT.fetch_add(1, Ordering::Relaxed);
-    let partial = folder.join(format!("{name}.{}-{number}.{PARTIAL}", std::process::id()));
-    let write = || {
-        let mut file = OpenOptions::new().write(true).create_new(true).open(&partial)?;
+    let partial = folder.join(format!("{name}.{:016x}-{number}.{PARTIAL}", *PROCESS));
+    let mut file = OpenOptions::new().write(true).create_new(true).open(&partial)?;
+    let mut write = || {
         [MAGIC, &checksum(content)[..], content].iter().try_for_each(|part| file.write_all(part))?;
-        drop(file);
         fs::rename(&partial, folder.join(name))
     };
-    write().inspect_err(|_| drop(fs::remove_file(&partial)))
+    write().inspect_err(|_| drop(fs::remove_file(&partial)))?;
+    // Only now: an unfinished file of that age would be taken for one of a killed process.
+    let _ = file.set_modified(SystemTime::now() - UNREAD_AGE);
+    Ok(())
 }
 
 /// A file of a cache.
@@ -276,7 +294,9 @@ struct Entry {
 /// The entries of a folder. Removes what killed processes left.
 fn list(folder: &Path) -> io::Result<Vec<Entry>> {
     let files = match fs::read_dir(folder) {
-        Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(Vec::new()),
+        Err(error) if error.kind() == io::ErrorKind::NotFound && !folder.is_symlink() => {
+            return Ok(Vec::new());
+        }
         files => files?,
     };
     let mut entries = Vec::new();
@@ -284,7 +304,10 @@ fn list(folder: &Path) -> io::Result<Vec<Entry>> {
         let path = file?.path();
         let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
         // Others may remove files meanwhile.
-        let Ok(metadata) = fs::metadata(&path) else { continue };
+        let Ok(metadata) = fs::symlink_metadata(&path) else { continue };
+        if !metadata.is_file() {
+            continue;
+        }
         let used = metadata.modified()?;
         if is_entry(&name) {
             entries.push(Entry { path, bytes: metadata.len(), used });
@@ -297,8 +320,12 @@ fn list(folder: &Path) -> io::Result<Vec<Entry>> {
 
 /// True for the file name of an entry. A folder that the user names may hold other files too.
 fn is_entry(name: &str) -> bool {
-    let hash = name.strip_suffix(EXTENSION).and_then(|name| name.strip_suffix('.')?.rsplit_once('-'));
-    hash.is_some_and(|(_, hash)| hash.len() == 32 && hash.bytes().all(|byte| byte.is_ascii_hexdigit()))
+    let parts = name.strip_suffix(EXTENSION).and_then(|name| name.strip_suffix('.')?.rsplit_once('-'));
+    parts.is_some_and(|(kind, hash)| {
+        kind.bytes().all(|byte| byte.is_ascii_lowercase() || byte == b'-')
+            && hash.len() == 32
+            && hash.bytes().all(|byte| matches!(byte, b'0'..=b'9' | b'a'..=b'f'))
+    })
 }
 
 /// True for the name of an unfinished entry.
@@ -319,16 +346,17 @@ pub fn usage(folder: &Path) -> io::Result<CacheUsage> {
 /// Removes all values of a folder, and returns what they were. Other files stay.
 ///
 /// # Errors
-/// The folder cannot be read, or a value cannot be removed.
+/// The folder cannot be read, or a value cannot be removed; all others are removed.
 pub fn clear(folder: &Path) -> io::Result<CacheUsage> {
     let mut removed = CacheUsage::default();
+    let mut failure = None;
     for Entry { path, bytes, .. } in list(folder)? {
         match fs::remove_file(&path) {
-            Err(error) if error.kind() != io::ErrorKind::NotFound => return Err(error),
+            Err(error) if error.kind() != io::ErrorKind::NotFound => failure = Some(error),
             _ => removed = CacheUsage { entries: removed.entries + 1, bytes: removed.bytes + bytes },
         }
     }
-    Ok(removed)
+    failure.map_or(Ok(removed), Err)
 }
 
 #[cfg(test)]
@@ -372,6 +400,7 @@ mod tests {
         assert_eq!(double(&silent(&folder), 4, &count), 8, "other inputs are another entry");
         assert_eq!(clear(&folder).unwrap().entries, 2);
         assert_eq!(double(&DiskCache::DISABLED, 21, &count), 42);
+        assert!(silent(&folder).is_in_use() && !DiskCache::DISABLED.is_in_use());
         assert_eq!((count.load(Ordering::Relaxed), usage(&folder).unwrap()), (3, CacheUsage::default()));
     }
 
@@ -407,6 +436,7 @@ mod tests {
         let count = AtomicUsize::new(0);
         assert_eq!([1, 1, 2].map(|number| double(&cache, number, &count)), [2, 2, 4]);
         assert_eq!((count.load(Ordering::Relaxed), REPORTS.load(Ordering::Relaxed)), (3, 1));
+        assert!(!cache.is_in_use());
     }
 
     #[test]
@@ -415,20 +445,57 @@ mod tests {
         let cache = DiskCache::new(root.path(), 10_000, |message| panic!("{message}"));
         let other = root.path().join("notes-of-a-user.softvt");
         fs::write(&other, "notes").unwrap();
-        let keys: Vec<CacheKey> = (0..20).map(|n| cache.key("block", &n).unwrap()).collect();
-        for (age, key) in keys.iter().enumerate().map(|(n, key)| (20 - n, key)) {
+        let keys: Vec<CacheKey> = (0..12).map(|n| cache.key("block", &n).unwrap()).collect();
+        let is_kept = |n: usize| root.path().join(keys[n].file_name()).exists();
+        for (n, key) in keys[..10].iter().enumerate() {
             cache.write(key, &vec![7_u8; 900]);
             let path = root.path().join(key.file_name());
-            let used = SystemTime::now() - Duration::from_secs(60 * age as u64);
+            let used = SystemTime::now() - (20 - n as u32) * USE_INTERVAL;
             File::open(path).unwrap().set_modified(used).unwrap();
         }
+        assert!(cache.read::<Vec<u8>>(&keys[0]).is_some(), "now it is the most recently used one");
+        cache.write(&keys[10], &vec![7_u8; 900]);
         let kept = usage(root.path()).unwrap();
-        assert!(kept.bytes <= 10_000 && kept.entries >= 8, "{kept:?}");
-        assert!(cache.read::<Vec<u8>>(&keys[19]).is_some() && cache.read::<Vec<u8>>(&keys[0]).is_none());
-        cache.write(&keys[0], &vec![7_u8; 20_000]);
-        assert!(cache.read::<Vec<u8>>(&keys[0]).is_none(), "larger than the whole cache");
+        assert!(kept.bytes <= 8_000 && kept.entries == 8, "{kept:?}");
+        assert!(is_kept(0) && is_kept(9) && !is_kept(1) && !is_kept(2));
+        assert!(!is_kept(10), "it was never read");
+        cache.write(&keys[11], &vec![7_u8; 20_000]);
+        assert!(!is_kept(11), "larger than the whole cache");
         clear(root.path()).unwrap();
         assert_eq!(only_file(root.path()), other);
+    }
+
+    #[test]
+    fn entries_that_were_never_read_are_removed_first() {
+        let root = tempfile::tempdir().unwrap();
+        let cache = DiskCache::new(root.path(), 10_000, |message| panic!("{message}"));
+        let keys: Vec<CacheKey> = (0..40).map(|n| cache.key("block", &n).unwrap()).collect();
+        for (number, key) in keys.iter().enumerate() {
+            cache.write(key, &vec![7_u8; 900]);
+            if number < 4 {
+                assert!(cache.read::<Vec<u8>>(key).is_some());
+            }
+        }
+        for key in &keys[..4] {
+            assert!(cache.read::<Vec<u8>>(key).is_some(), "it was read, and 36 new ones were not");
+        }
+        assert!(usage(root.path()).unwrap().bytes <= 10_000);
+    }
+
+    #[test]
+    fn only_regular_files_with_names_of_entries_are_counted_and_removed() {
+        let (root, count) = (tempfile::tempdir().unwrap(), AtomicUsize::new(0));
+        double(&silent(root.path()), 21, &count);
+        let hash = "0123456789abcdef0123456789abcdef";
+        fs::create_dir(root.path().join(format!("mesh-{hash}.softvt"))).unwrap();
+        let mut others =
+            vec![format!("mesh-{}.softvt", hash.to_uppercase()), format!("My photo-{hash}.softvt")];
+        others.iter().for_each(|name| fs::write(root.path().join(name), "mine").unwrap());
+        others.push(format!("mesh-{hash}.softvt"));
+        assert_eq!(usage(root.path()).unwrap().entries, 1);
+        assert_eq!(clear(root.path()).unwrap().entries, 1);
+        assert!(others.iter().all(|name| root.path().join(name).exists()));
+        assert_eq!(fs::read_dir(root.path()).unwrap().count(), 3);
     }
 
     #[test]

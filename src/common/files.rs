@@ -60,8 +60,22 @@ pub fn create_parent(path: &Path) -> Result<(), FileError> {
 pub fn create_writable_folder(dir: &Path) -> Result<(), FileError> {
     create_folder(dir)?;
     let probe = dir.join(".softvt");
-    let created = File::create(&probe).and_then(|_| fs::remove_file(&probe));
-    created.map_err(FileError::io("write to", dir))
+    File::create(&probe).map_err(FileError::io("write to", dir))?;
+    // Another process may have removed it.
+    remove_if_present(&probe)
+}
+
+/// Checks that [`replace`] can create a file at `path`, or the first missing folder on the way.
+///
+/// # Errors
+/// Its folder is read-only or no folder.
+pub fn check_creatable(path: &Path) -> Result<(), FileError> {
+    let probe = temp_path(&missing_folders(path).pop().unwrap_or_else(|| path.to_owned()));
+    match OpenOptions::new().write(true).create_new(true).open(&probe) {
+        Ok(_) => remove_if_present(&probe),
+        Err(error) if error.kind() == io::ErrorKind::AlreadyExists => Ok(()),
+        Err(error) => Err(FileError::io("write", path)(error)),
+    }
 }
 
 /// The folders that [`create_folder`] would create for `dir`, deepest first.

@@ -280,7 +280,7 @@ pub(crate) fn run_suite(
             episode_line(record)
         };
         log.run_jobs(
-            &config.job_list(&run.name),
+            &config.job_list(&format!("running {}", run.name)),
             &remaining,
             simulate,
             |finished| artifacts.write(finished),
@@ -315,7 +315,7 @@ pub(crate) fn run_episodes(
     let (config, mut records) = (run.config, Vec::new());
     let simulate = |position| run.run_episode(run.jobs.job(position), false, &run.controllers);
     config.run_jobs(
-        &config.job_list(&run.name),
+        &config.job_list(&format!("running {}", run.name)),
         run.jobs.len(),
         simulate,
         |_, finished: FinishedEpisode| {

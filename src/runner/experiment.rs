@@ -135,7 +135,7 @@ pub fn run<E: From<RunError>>(
         }
         Ok(FinishedPoint { point, parameters, rows })
     };
-    let list = config.job_list(name);
+    let list = config.job_list(&format!("running {name}"));
     let outcome = config.run_jobs(&list, left.len(), run_point, |_, found: FinishedPoint| {
         let line = format!("point {}: {}", found.point, counted(found.rows.len(), "row"));
         if let Some(folder) = &mut folder {

@@ -38,7 +38,7 @@ pub struct MachineRates {
     pub machine: String,
     /// CPU time from nothing to the first observation with all streams, without a cache on disk, s.
     pub first_observation_s: f64,
-    /// The same with what an earlier process left in the cache of the process, s.
+    /// The same with what an earlier process left in the cache of the process, s; `None` without such a cache.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub cached_first_observation_s: Option<f64>,
     /// Rates on one thread.
@@ -119,6 +119,7 @@ pub fn measure(
     time_episode(&loaded, &all_streams(), &Caches::default())?;
     let caches = Caches::default();
     let cached = time_episode(&loaded, &all_streams(), &caches)?;
+    let has_cache = DiskCache::default().is_in_use();
     let mut streams = Vec::new();
     for (index, name) in STREAMS.into_iter().enumerate() {
         on_stage(name);
@@ -135,7 +136,7 @@ pub fn measure(
         script: script.to_owned(),
         machine: processor(),
         first_observation_s: first.until_action_s,
-        cached_first_observation_s: Some(cached.until_action_s),
+        cached_first_observation_s: has_cache.then_some(cached.until_action_s),
         streams,
         threads,
         observations_per_s,

@@ -177,7 +177,7 @@ impl<'a> SuiteRecording<'a> {
             let path = actions::path(&self.run.out, finished.record.header.id.index());
             Ok(actions::write(&path, &finished.actions)?)
         };
-        let list = self.run.config.job_list(&self.folder_name);
+        let list = self.run.config.job_list(&format!("recording {}", self.folder_name));
         loop {
             let due = |task: &'a Task| {
                 self.due(&log.records, task.id).into_iter().map(move |episode| EpisodeJob { task, episode })

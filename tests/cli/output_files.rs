@@ -11,6 +11,16 @@ fn has(value: &Value, keys: &[&str]) {
 }
 
 #[test]
+fn a_file_that_cannot_be_written_is_refused_before_the_work() {
+    let project = Project::new(&[("file", "")]);
+    for flag in ["--out", "--growth"] {
+        let refused = project.refusal(&format!("bench {flag} file/x.svg"));
+        assert!(refused.starts_with("cannot write file/x.svg: "), "{refused}");
+    }
+    assert!(!project.path("file.part").exists());
+}
+
+#[test]
 fn lists_are_printed_as_text_and_as_json() {
     let project = Project::new(&[]);
     let json = |what: &str| -> Vec<Value> {

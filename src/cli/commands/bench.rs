@@ -45,12 +45,14 @@ pub(super) fn run(args: &BenchArgs) -> Result<(), CliError> {
     let on_stage = |stage: &str| eprint_notice(format!("measuring: {stage}"));
     if let Some(path) = &args.growth {
         let curves = growth::measure(&published.script, thread_count(args.threads), on_stage)?;
-        replace(path, growth::plot(&curves))?;
-        return print(&growth::table(&curves));
+        let written = replace(path, growth::plot(&curves));
+        print(&growth::table(&curves))?;
+        return Ok(written?);
     }
     let rates = rates::measure(&published.script, thread_count(args.threads), on_stage)?;
-    if let Some(path) = &args.out {
-        replace(path, [serde_json::to_string_pretty(&rates)?.as_bytes(), b"\n"].concat())?;
-    }
-    print(&rates.table_beside(&published))
+    let json = [serde_json::to_string_pretty(&rates)?.as_bytes(), b"\n"].concat();
+    let written = args.out.as_ref().map_or(Ok(()), |path| replace(path, json));
+    // The table is printed whatever happens to the file: measuring takes long.
+    print(&rates.table_beside(&published))?;
+    Ok(written?)
 }
