@@ -40,8 +40,7 @@ const PARTIAL: &str = "part";
 const MIN_TIME: Duration = Duration::from_millis(1);
 /// Interval at which the time of the last use of an entry is updated.
 const USE_INTERVAL: Duration = Duration::from_secs(60);
-/// Time since the last use that a new entry begins with: until it is read, it is removed before those that were read
-/// more recently.
+/// Age that a new entry begins with. Until it is read, it is removed before all that were read within this time.
 const UNREAD_AGE: Duration = Duration::from_secs(24 * 3600);
 /// Age from which an unfinished file belongs to a process that was killed.
 const STALE_AGE: Duration = Duration::from_secs(3600);
@@ -100,9 +99,9 @@ impl DiskCache {
     /// Stores nothing.
     pub const DISABLED: Self = Self(None);
 
-    /// A cache in a folder, which is created with the first entry. Those that were never read, then the least recently
-    /// used entries are removed when all are larger than `limit` bytes. `report` is told at most once that the folder
-    /// cannot be used.
+    /// A cache in a folder, which is created with the first entry. When the entries exceed `limit` bytes, those that
+    /// were never read are removed, then the least recently used ones. `report` is called at most once, with why the
+    /// folder cannot be used.
     pub fn new(folder: impl Into<PathBuf>, limit: u64, report: fn(&str)) -> Self {
         let state = Mutex::default();
         Self(Some(Arc::new(CacheFolder { path: folder.into(), limit, report, state })))
