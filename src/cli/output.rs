@@ -163,20 +163,19 @@ pub(crate) fn check_output_file(flag: &str, path: &Path, format: OutputFormat) -
     {
         return Err(CliError::input(format!("{flag} {file}: give a file that ends in .{extension}")));
     }
-    if !path.exists() {
-        return Ok(check_creatable(path)?);
-    }
     let mut first = Vec::new();
     if path.is_file() {
         let opened = File::open(path).and_then(|file| file.take(64).read_to_end(&mut first));
         opened.map_err(FileError::io("read", path))?;
     }
     // Empty files, such as those of mktemp, hold nothing to lose.
-    if path.is_file() && (first.is_empty() || format.begins_with(&first)) {
-        return Ok(check_creatable(path)?);
+    if path.exists() && !(path.is_file() && (first.is_empty() || format.begins_with(&first))) {
+        let name = format.name();
+        return Err(CliError::input(format!(
+            "{flag} {file}: it exists and is no {name} file; give another name"
+        )));
     }
-    let name = format.name();
-    Err(CliError::input(format!("{flag} {file}: it exists and is no {name} file; give another name")))
+    Ok(check_creatable(path)?)
 }
 
 /// Prints a message of the program to standard error, after `softvt: `, with control characters escaped.

@@ -267,7 +267,7 @@ fn read_entry(path: &Path) -> io::Result<Option<Vec<u8>>> {
 /// Writes an entry under another name and renames it. It need not survive a power failure: its checksum would tell.
 fn write_entry(folder: &Path, name: &str, content: &[u8]) -> io::Result<()> {
     static COUNT: AtomicU64 = AtomicU64::new(0);
-    /// Processes in two containers can have one id.
+    /// A random number: in two containers, processes can have equal ids.
     static PROCESS: LazyLock<u64> = LazyLock::new(|| RandomState::new().hash_one(std::process::id()));
     fs::create_dir_all(folder)?;
     let number = COUNT.fetch_add(1, Ordering::Relaxed);

@@ -60,9 +60,7 @@ pub fn create_parent(path: &Path) -> Result<(), FileError> {
 pub fn create_writable_folder(dir: &Path) -> Result<(), FileError> {
     create_folder(dir)?;
     let probe = dir.join(".softvt");
-    File::create(&probe).map_err(FileError::io("write to", dir))?;
-    // Another process may have removed it.
-    remove_if_present(&probe)
+    try_create(&probe).map_err(FileError::io("write to", dir))
 }
 
 /// Checks that [`replace`] can create a file at `path`, or the first missing folder on the way.
@@ -71,10 +69,15 @@ pub fn create_writable_folder(dir: &Path) -> Result<(), FileError> {
 /// Its folder is read-only or no folder.
 pub fn check_creatable(path: &Path) -> Result<(), FileError> {
     let probe = temp_path(&missing_folders(path).pop().unwrap_or_else(|| path.to_owned()));
-    match OpenOptions::new().write(true).create_new(true).open(&probe) {
-        Ok(_) => remove_if_present(&probe),
+    try_create(&probe).map_err(FileError::io("write", path))
+}
+
+/// Creates a file and removes it again. One that exists stays, also one of another process that does the same.
+fn try_create(probe: &Path) -> io::Result<()> {
+    match OpenOptions::new().write(true).create_new(true).open(probe) {
+        Ok(_) => fs::remove_file(probe),
         Err(error) if error.kind() == io::ErrorKind::AlreadyExists => Ok(()),
-        Err(error) => Err(FileError::io("write", path)(error)),
+        Err(error) => Err(error),
     }
 }
 

@@ -43,16 +43,20 @@ pub(super) fn run(args: &BenchArgs) -> Result<(), CliError> {
         .ok_or_else(|| CliError::input("this build has no assets/rates.json, which names the suite"))?;
     let published: MachineRates = serde_json::from_slice(published)?;
     let on_stage = |stage: &str| eprint_notice(format!("measuring: {stage}"));
-    if let Some(path) = &args.growth {
-        let curves = growth::measure(&published.script, thread_count(args.threads), on_stage)?;
-        let written = replace(path, growth::plot(&curves));
-        print(&growth::table(&curves))?;
-        return Ok(written?);
-    }
-    let rates = rates::measure(&published.script, thread_count(args.threads), on_stage)?;
-    let json = [serde_json::to_string_pretty(&rates)?.as_bytes(), b"\n"].concat();
-    let written = args.out.as_ref().map_or(Ok(()), |path| replace(path, json));
+    let threads = thread_count(args.threads);
+    let (table, file) = match &args.growth {
+        Some(_) => {
+            let curves = growth::measure(&published.script, threads, on_stage)?;
+            (growth::table(&curves), growth::plot(&curves))
+        }
+        None => {
+            let rates = rates::measure(&published.script, threads, on_stage)?;
+            (rates.table_beside(&published), serde_json::to_string_pretty(&rates)? + "\n")
+        }
+    };
+    let path = args.growth.as_ref().or(args.out.as_ref());
+    let written = path.map_or(Ok(()), |path| replace(path, file));
     // The table is printed whatever happens to the file: measuring takes long.
-    print(&rates.table_beside(&published))?;
+    print(&table)?;
     Ok(written?)
 }

@@ -91,7 +91,7 @@ pub(super) fn run(args: ViewArgs) -> Result<(), CliError> {
             found.display()
         )));
     }
-    files::create_folder(&args.out)?;
+    files::create_writable_folder(&args.out)?;
     config.observer.work("simulating the episode");
     let simulate = |number: usize| runs[number].run_episode(job, true, &runs[number].controllers);
     let mut episodes = Vec::new();
