@@ -3,7 +3,7 @@
 use softvt::geometry::Vec3;
 
 use crate::{
-    friction,
+    drives, friction,
     page::{Report, header, heading, percent, row, short, yes},
     time_step,
 };
@@ -77,6 +77,26 @@ pub fn time_step(report: &mut Report) {
         );
     }
     moving(report);
+    hand(report);
+}
+
+/// Prints the acceleration of the hand along a planned path.
+fn hand(report: &mut Report) {
+    let path = drives::path_acceleration();
+    println!(
+        "\nPeak acceleration of the hand along a lift by 0.1 m in 1.2 s, which is commanded at 20 Hz; that of the path is {path:.3} m/s².\n"
+    );
+    header(&["physics steps per second", "m/s²", "over the path"]);
+    let found = drives::RATES.map(drives::hand_acceleration);
+    for (rate, found) in drives::RATES.iter().zip(found) {
+        row(&[rate.to_string(), format!("{found:.3}"), format!("{:.2}", found / path)]);
+    }
+    report.claim("acceleration of the hand, 60 to 480 Hz", found.map(|a| a / found[3] - 1.0), 0.2);
+    report.claim(
+        "acceleration of the hand over that of the path, less 1",
+        found.map(|a| a / path - 1.0),
+        1.0,
+    );
 }
 
 /// Prints what depends on the step: the swing of a lifted body, and the speed of a rolling one.

@@ -4,6 +4,8 @@
 mod bodies;
 #[path = "../../tests/validation/camera.rs"]
 mod camera;
+#[path = "../../tests/validation/drives.rs"]
+mod drives;
 #[path = "../../tests/validation/element.rs"]
 mod element;
 #[path = "../../tests/validation/extremes.rs"]

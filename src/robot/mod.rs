@@ -6,6 +6,7 @@
 //! two gel apexes; a pad frame on each finger (see [`pads`]).
 #![warn(missing_docs, unreachable_pub)]
 
+pub mod arm;
 pub mod clearance;
 pub mod gripper;
 pub mod ik;
@@ -15,6 +16,7 @@ pub mod rotation;
 pub mod spec;
 pub mod tactile;
 
+pub use arm::ArmSetpoint;
 pub use clearance::{Clearance, Obstacle, clearance};
 pub use gripper::{GripTarget, GripperSetpoint};
 pub use ik::{DiffIk, UnreachablePose};

@@ -11,7 +11,7 @@ use softvt_physics::{
 };
 use softvt_policy::RobotState;
 use softvt_robot::{
-    RobotSpec, Side,
+    ArmSetpoint, RobotSpec, Side,
     gripper::{self, FingerState, GripTarget, GripperSetpoint},
     ik::{ArmAngles, DiffIk},
     pads::{self, PadSurface},
@@ -34,6 +34,7 @@ pub struct RobotInstance {
     /// Pose of the base, world.
     pub base_w: Pose,
     ik: DiffIk,
+    arm: ArmSetpoint,
     gripper: GripperSetpoint,
     /// Commands that the robot has not responded to yet, oldest first.
     delayed: VecDeque<DelayedCommand>,
@@ -109,6 +110,7 @@ impl RobotInstance {
             body,
             base_w: *base_w,
             ik: DiffIk::new(&spec.ik, *q, control_dt),
+            arm: ArmSetpoint::new(*q, control_dt),
             gripper: GripperSetpoint::new(&spec.gripper, gripper::MAX_WIDTH),
             delayed: VecDeque::with_capacity(spec.latency as usize + 1),
             spec: spec.clone(),
@@ -134,13 +136,12 @@ impl RobotInstance {
             Some(joints) if is_disturbed => self.ik.step_joints(&q, &self.ik.moved(&joints, &executed_b)),
             Some(joints) => self.ik.step_joints(&q, &joints),
         };
-        let drives = world.articulation_mut(self.articulation).drives_mut();
-        drives.iter_mut().flatten().zip(target).for_each(|(drive, q)| drive.target = q);
+        self.arm.command(target);
         self.gripper.command(grip);
         Some(commanded)
     }
 
-    /// Advances the finger targets by one physics step; called before the step.
+    /// Advances the targets of all drives by one physics step; called before the step.
     pub fn advance(&mut self, world: &mut World) {
         let (dt, width) = (world.params.dt, self.width(world));
         let articulation = world.articulation_mut(self.articulation);
@@ -148,8 +149,9 @@ impl RobotInstance {
         // The fingers close towards smaller joint coordinates.
         let closing_force = -fingers.iter().sum::<f64>() / fingers.len() as f64;
         self.gripper.advance(dt, FingerState { width, closing_force });
-        let target = self.gripper.finger_target();
-        articulation.drives_mut()[ARM_DOFS..].iter_mut().flatten().for_each(|drive| drive.target = target);
+        let fingers = [self.gripper.finger_target(); 2];
+        let targets = self.arm.advance(dt).into_iter().chain(fingers);
+        articulation.drives_mut().iter_mut().flatten().zip(targets).for_each(|(drive, q)| drive.target = q);
     }
 
     /// Stiffness of the drive of a finger, N/m.

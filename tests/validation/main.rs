@@ -6,6 +6,7 @@
 #[path = "../bodies/mod.rs"]
 mod bodies;
 mod camera;
+mod drives;
 mod element;
 mod extremes;
 mod free;
