@@ -14,6 +14,7 @@ return softvt.conditions {
   conditions = {
     { name = "tactile-servo", policy = "tactile-servo" },
     { name = "look-retry", policy = "look-retry" },
+    { name = "weigh", policy = "weigh" },
     { name = "size-seen", policy = "size-seen" },
     { name = "contact-depth", policy = "contact-depth" },
     { name = "drives", policy = "drives" },

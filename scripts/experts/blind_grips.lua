@@ -3,9 +3,11 @@
 -- of the size: the number that is inside of the safe windows of the largest share of the instances that the suite
 -- draws. A policy without touch can do that much.
 --
--- look-retry is no such bound: it lifts, looks whether the object follows, and closes further.
+-- look-retry and weigh are no such bounds: they lift, look whether the object follows or weigh what hangs on the arm, and
+-- close further.
 local grasp = require "experts.grasp"
 local hand = require "experts.hand"
+local trial_constants = require "experts.trial_constants"
 
 local blind_grips = {}
 
@@ -23,10 +25,15 @@ local DRIVE_RESOLUTION, DRIVE_FAST, DRIVE_STEP, DRIVE_WAIT = 1e-4, 2e-4, 1e-4, 0
 -- Gap that such a hand has on average when it first reads one, m: a reading rounds, and a step passes the threshold by
 -- half of itself.
 local CONTACT_GAP = 0.75 * DRIVE_RESOLUTION
--- Looking: height of a trial, m, error of a look, m (1 sd), looks that are averaged, and factors on the indentation
--- after a trial that failed and one that succeeded. The wrist camera has 2 mm per pixel at 128 pixels; the position of
--- an outline some 25 pixels wide is known to a third of a pixel.
-local TRIAL_HEIGHT, LOOK_ERROR, LOOKS, TIGHTER, MARGIN = 0.004, 0.0007, 3, 1.15, 1.1
+-- Height (m) and speed (m/s) of a trial lift.
+local TRIAL_HEIGHT, TRIAL_SPEED = 0.004, 0.05
+-- Time after which the arm has come to rest from its approach to a micrometre, s.
+local REST = 1
+-- Error of a look, m (1 sd). The wrist camera has 2 mm per pixel at 128 pixels; the position of an outline some 25 pixels
+-- wide is known to a third of a pixel.
+local LOOK_ERROR = 0.0007
+-- Share of the sample that needs less indentation than the loosest grip that trials start from.
+local LOOSEST = 0.03
 
 -- Powers of the size by which a number may scale.
 local SIZE_POWERS = { 0, 1, 2, 3 }
@@ -244,38 +251,81 @@ local function normal(deviation)
 end
 
 -- Mean height of an object in some looks, m.
-local function look(arm, scene, name)
+local function look(arm, scene, name, looks)
   local sum = 0
-  for _ = 1, LOOKS do
+  for _ = 1, looks do
     arm:wait(arm.dt)
     sum = sum + scene:object(name).centre[3] + normal(LOOK_ERROR)
   end
-  return sum / LOOKS
+  return sum / looks
 end
 
--- Starts at the loosest command of the sample for the seen size, lifts by some millimetres, and closes further until
--- the object is seen to follow the hand. Repeated grasps begin where the last one ended.
-local function look_retry(instances, object)
-  local loosest, tightest = math.huge, 0
-  for _, one in ipairs((with_windows(instances, object.name, INSTANCES))) do
-    loosest = math.min(loosest, command_depth(one.window.loose, one.window) / one.instance.scale)
+-- A trial lift, with `sense` at its top.
+local function lift(arm, chosen, sense)
+  arm:move_to(chosen.pose:translated { 0, 0, TRIAL_HEIGHT }, { speed = TRIAL_SPEED })
+  local sensed = sense()
+  arm:move_to(chosen.pose, { speed = TRIAL_SPEED })
+  return sensed
+end
+
+-- By controller that finds the grip of an instance by trial: a function of the arm, the scene, the grasp, the name of
+-- the object and the constants of the controller, called before the hand closes. It returns a function that lifts the
+-- hand by some millimetres and returns true if the object is held, with the number of earlier trials in which it was.
+local TRIALS = {
+  -- Looks whether the object follows the hand.
+  ["look-retry"] = function(arm, scene, chosen, name, constants)
+    return function()
+      local before = look(arm, scene, name, constants.looks)
+      local at_top = lift(arm, chosen, function() return look(arm, scene, name, constants.looks) end)
+      return at_top - before > constants.follows * TRIAL_HEIGHT, 0
+    end
+  end,
+  -- Weighs what the arm carries by the height at which it hangs below its command: its drives are springs. Pads that
+  -- slide along an object carry more the more they press; an object that is held weighs the same in the next grip.
+  weigh = function(arm, _, chosen, _, constants)
+    local function droop()
+      arm:wait(constants.seconds)
+      return lift(arm, chosen, function()
+        arm:wait(constants.seconds)
+        return arm.target.z - arm.pose.z
+      end)
+    end
+    arm:wait(REST)
+    local free, last = droop(), 0
+    return function()
+      local load = droop() - free
+      local is_held = last > 0 and load < constants.growth * last
+      last = load
+      return is_held, 1
+    end
+  end,
+}
+
+-- Starts loose for the seen size, lifts by some millimetres, and closes further until the object is held; then closes to
+-- the least grip that held and a margin. Repeated grasps begin where the last one ended.
+local function by_trial(name, instances, object)
+  local constants, depths, tightest = trial_constants[name], {}, 0
+  for index, one in ipairs((with_windows(instances, object.name, INSTANCES))) do
+    depths[index] = command_depth(one.window.loose, one.window) / one.instance.scale
     tightest = math.max(tightest, command_depth(one.window.tight, one.window) / one.instance.scale)
   end
-  if tightest == 0 then return nil end
-  local indentation = loosest * object.scale
+  if #depths == 0 then return nil end
+  table.sort(depths)
+  local indentation = constants.start * depths[math.ceil(LOOSEST * #depths)] * object.scale
   return function(arm, scene, chosen, contact)
+    local try = TRIALS[name](arm, scene, chosen, object.name, constants)
     while true do
       close_to_command(arm, contact - indentation)
       arm:wait(2 * arm.dt)
-      local before = look(arm, scene, object.name)
-      arm:move_to(chosen.pose:translated { 0, 0, TRIAL_HEIGHT }, { speed = 0.05 })
-      local rise = look(arm, scene, object.name) - before
-      arm:move_to(chosen.pose, { speed = 0.05 })
-      if rise > 0.5 * TRIAL_HEIGHT then break end
+      local is_held, ago = try()
+      if is_held then
+        indentation = indentation / constants.tighter ^ ago
+        break
+      end
       if indentation > tightest * object.scale then break end
-      indentation = indentation * TIGHTER
+      indentation = indentation * constants.tighter
     end
-    indentation = indentation * MARGIN
+    indentation = indentation * constants.margin
     close_to_command(arm, contact - indentation)
   end
 end
@@ -284,8 +334,8 @@ end
 -- without a safe window, which any grip holds.
 function blind_grips.controller(name, instances, object)
   local close
-  if name == "look-retry" then
-    close = look_retry(instances, object)
+  if TRIALS[name] then
+    close = by_trial(name, instances, object)
   else
     local best = blind_grips.best(name, blind_grips.sample(name, instances, object.name))
     close = best

@@ -143,7 +143,7 @@ pub enum BuiltinPolicy {
 
 impl BuiltinPolicy {
     /// All, in the order in which they are listed.
-    pub const ALL: [Self; 12] = [
+    pub const ALL: [Self; 13] = [
         Self::Expert,
         Self::ExpertBinary,
         Self::TactileServo,
@@ -154,6 +154,7 @@ impl BuiltinPolicy {
         Self::Controlled(BlindGrip::OneForceForAll),
         Self::Controlled(BlindGrip::Drives),
         Self::Controlled(BlindGrip::LookRetry),
+        Self::Controlled(BlindGrip::Weigh),
         Self::Noop,
         Self::Random,
     ];
@@ -206,6 +207,9 @@ impl BuiltinPolicy {
                 }
                 BlindGrip::LookRetry => {
                     "the same expert without touch: lifts, looks whether the object follows, and closes further (privileged)"
+                }
+                BlindGrip::Weigh => {
+                    "the same expert without touch: lifts, weighs the object by the droop of the arm, and closes further (privileged)"
                 }
             },
             Self::Noop => "holds still with the gripper open",
@@ -496,7 +500,7 @@ impl PolicyConfig {
 
     /// True for a bound of what can be done without touch: a grip that keeps one number constant.
     pub fn is_blind_bound(&self) -> bool {
-        matches!(self.expert(), Some(ExpertGrip::Blind(grip)) if grip.is_bound())
+        matches!(self.expert(), Some(ExpertGrip::Blind(grip)) if grip.is_constant_number())
     }
 
     /// The server of the policy, if it has one.

@@ -45,6 +45,8 @@ pub enum BlindGrip {
     Drives,
     /// Grasps that are repeated until the object follows the hand.
     LookRetry,
+    /// Grasps that are repeated until the arm carries the weight of the object.
+    Weigh,
 }
 
 impl BlindGrip {
@@ -58,12 +60,13 @@ impl BlindGrip {
             Self::OneForceForAll => "one-force-for-all",
             Self::Drives => "drives",
             Self::LookRetry => "look-retry",
+            Self::Weigh => "weigh",
         }
     }
 
-    /// True for a bound of what a policy without touch can do.
-    pub fn is_bound(self) -> bool {
-        self != Self::LookRetry
+    /// True for a controller that keeps one number constant; the others find the grip of the instance by trial.
+    pub fn is_constant_number(self) -> bool {
+        !matches!(self, Self::LookRetry | Self::Weigh)
     }
 }
 
