@@ -5,6 +5,6 @@
 -- on the least one that held. look-retry: images that a look averages, and the share of a lift that the object must
 -- follow. weigh: time for which the arm comes to rest, s, and the factor below which two grips carry the same load.
 return {
-  ["look-retry"] = { start = 0.85, tighter = 1.08, margin = 1.2, looks = 3, follows = 0.45 },
-  weigh = { start = 0.85, tighter = 1.08, margin = 1.2, seconds = 0.3, growth = 1.01 },
+  ["look-retry"] = { start = 0.85, tighter = 1.12, margin = 1.15, looks = 6, follows = 0.45 },
+  weigh = { start = 0.85, tighter = 1.12, margin = 1.2, seconds = 0.3, growth = 1.01 },
 }
