@@ -134,7 +134,7 @@ local function report(rows)
     kinds_of_suites[#kinds_of_suites + 1] = table_of(name, own)
   end
   return table_of("suite", suites)
-    .. "\nBest without touch: "
+    .. "\nBest constant number: "
     .. table.concat(best, "; ")
     .. ".\n\n"
     .. table.concat(kinds_of_suites, "\n")

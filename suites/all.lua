@@ -1,5 +1,5 @@
 -- The whole benchmark: the four suites of the paper, soft and rigid, with varying objects or layouts, and the two
--- suites that need touch.
+-- suites in which the grip has to be found by trial.
 return {
   require "suites.object_soft",
   require "suites.spatial_soft",

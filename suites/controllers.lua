@@ -1,6 +1,6 @@
 -- Controllers that differ only in how the hand closes: the expert knows the object (reference), tactile-servo feels it,
--- and the others know only what can be seen of it, and the statistics of the suite. The best of those without touch
--- says what a suite needs. Prints one table.
+-- look-retry and weigh find its grip by trial without touch, and the others know only what can be seen of it, and the
+-- statistics of the suite: each keeps one number constant. The best of these says what a suite needs. Prints one table.
 --
 --   softvt suites/controllers.lua --episodes 50
 return softvt.conditions {

@@ -14,8 +14,8 @@ const ALL: &str = "results";
 const RATES: &str = "rates";
 /// Script of the runs on the first screen.
 const FIRST_SCRIPT: &str = "suites/hidden.lua";
-/// Controllers on the first screen above and below the bound without touch.
-const ABOVE_BOUND: [&str; 3] = ["expert", "tactile-servo", "look-retry"];
+/// Controllers on the first screen above and below the best constant number.
+const ABOVE_BOUND: [&str; 4] = ["expert", "tactile-servo", "look-retry", "weigh"];
 const BELOW_BOUND: [&str; 1] = ["expert-binary"];
 
 /// The README with new tables and rates, if it has places for them.
@@ -69,7 +69,7 @@ fn replaced(readme: &str, name: &str, tables: &str) -> Result<String, String> {
     }
 }
 
-/// Both verdicts in the suites that need touch: of controllers at both ends, and the bound without touch.
+/// Both verdicts in the hidden suites: of controllers at both ends, and of the best constant number.
 pub fn first_screen(results: &[Results], labels: &Value) -> String {
     let Some(one) = results.iter().find(|one| one.script == FIRST_SCRIPT) else { return String::new() };
     let mut text = verdict_header(&one.suites);
@@ -83,7 +83,7 @@ pub fn first_screen(results: &[Results], labels: &Value) -> String {
     names.dedup();
     let names: Vec<String> = names.iter().map(|name| format!("`{name}`")).collect();
     text += &ABOVE_BOUND.map(of).concat();
-    text += &shown(best, format!("[bound without touch](docs/touch.md): {}", names.join(", ")));
+    text += &shown(best, format!("[best constant number](docs/touch.md): {}", names.join(", ")));
     text + &BELOW_BOUND.map(of).concat()
 }
 

@@ -1,5 +1,5 @@
 -- The hidden variation: besides size and looks, every object differs in properties that do not show. Its safe grip
--- forces lie within a factor of 1.25 to 1.5, and where they lie has to be felt.
+-- forces lie within a factor of 1.25 to 1.5, and where they lie has to be found by trial.
 --
 --   softvt suites/object_soft.lua --vary=scripts/variations/hidden.lua
 local standard = require "variations.standard"

@@ -72,7 +72,7 @@ pub struct ConditionRow {
     /// Policy in place of that of the reference; absent for the same.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub policy: Option<String>,
-    /// True if the policy is a bound of what can be done without touch.
+    /// True if the policy keeps one number constant, by what shows of an object.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub blind: bool,
     /// Null if the condition could have no effect and was not run.
@@ -165,7 +165,7 @@ pub fn compares_policies(tables: &[ConditionTable]) -> bool {
 }
 
 /// Tables of policies by suite, for conditions that differ in the policy alone. All suites have the same rows. Under
-/// each the best policy without touch.
+/// each the best of those that keep one number constant.
 pub fn controllers_table(tables: &[ConditionTable], format: TerminalFormat) -> String {
     let per_table = (format.width.saturating_sub(1 + POLICY_WIDTH) / (SUITE_WIDTH + 1)).clamp(1, 4);
     let text: String = tables.chunks(per_table).map(controllers_of_suites).collect();
@@ -204,15 +204,15 @@ fn controllers_of_suites(suites: &[ConditionTable]) -> String {
     }
     table.rule();
     if suites.iter().flat_map(|suite| &suite.rows).any(|row| row.blind) {
-        table.line("* without touch: knows what shows of an object and the statistics of the suite");
+        table.line("* one constant number, by what shows of an object and the statistics of the suite");
         for suite in suites {
-            table.line(format!("best without touch, {}: {}", suite.suite, best_blind(suite)));
+            table.line(format!("best constant number, {}: {}", suite.suite, best_blind(suite)));
         }
     }
     table.text
 }
 
-/// The policy without touch that is safe most often, with the interval of its Safety Success.
+/// The policy with a constant number that is safe most often, with the interval of its Safety Success.
 fn best_blind(suite: &ConditionTable) -> String {
     let safety =
         |row: &ConditionRow| row.outcome.as_ref().and_then(|outcome| outcome.safety_success_rate.rate);
@@ -342,8 +342,8 @@ mod tests {
         let words: Vec<&str> = lines("middle *")[1].split_whitespace().collect();
         assert_eq!(words, ["middle", "*", "100.0", "/", "50.0", "100.0", "/", "50.0"]);
         assert_eq!(
-            lines("best without touch, rolls"),
-            ["best without touch, rolls: middle, Safety 50.0 % [9.5, 90.5]"]
+            lines("best constant number, rolls"),
+            ["best constant number, rolls: middle, Safety 50.0 % [9.5, 90.5]"]
         );
         assert!(lines("reference").is_empty(), "{text}");
     }

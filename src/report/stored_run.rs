@@ -128,7 +128,7 @@ impl StoredRun {
         self.manifest["privileged"].as_bool() == Some(true)
     }
 
-    /// True if the policy is a bound of what can be done without touch. Runs of earlier versions do not say so.
+    /// True if the policy keeps one number constant, by what shows of an object. Runs of earlier versions do not say so.
     pub fn is_blind_bound(&self) -> bool {
         self.manifest["blind"].as_bool() == Some(true)
     }

@@ -498,7 +498,7 @@ impl PolicyConfig {
         }
     }
 
-    /// True for a bound of what can be done without touch: a grip that keeps one number constant.
+    /// True for a grip that keeps one number constant, by what shows of an object.
     pub fn is_blind_bound(&self) -> bool {
         matches!(self.expert(), Some(ExpertGrip::Blind(grip)) if grip.is_constant_number())
     }

@@ -68,7 +68,7 @@ pub(crate) struct RunManifest<'a> {
     #[serde(skip_serializing_if = "Option::is_none")]
     replan: Option<usize>,
     privileged: bool,
-    /// True if the policy is a bound of what can be done without touch.
+    /// True if the policy keeps one number constant, by what shows of an object.
     #[serde(skip_serializing_if = "std::ops::Not::not")]
     blind: bool,
     seed: u64,

@@ -116,7 +116,7 @@ fn conditions_may_name_a_built_in_policy() {
     let tables = project.run("trial.lua").out("blind").conditions().expect("valid");
     let printed = controllers_table(&tables, TerminalFormat::PLAIN);
     assert!(
-        printed.contains("\nother *") && printed.contains("best without touch, one: other, Safety"),
+        printed.contains("\nother *") && printed.contains("best constant number, one: other, Safety"),
         "{printed}"
     );
     project.write("trial.lua", plan("exprt").as_bytes());

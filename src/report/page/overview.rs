@@ -36,7 +36,7 @@ pub(super) fn overview(runs: &[RunSummary]) -> Markup {
             @for of_suite in runs.chunk_by(|a, b| a.summary.suite == b.summary.suite) {
                 @if let Some(bound) = blind_bound(of_suite) {
                     p.note {
-                        "Dashed in " (of_suite[0].summary.suite) ": Safety of the best controller here that keeps one number constant, without touch ("
+                        "Dashed in " (of_suite[0].summary.suite) ": Safety of the best controller here that keeps one number constant ("
                         (bound.policy) ", " (format!("{:.0}", bound.safety)) " %)."
                     }
                 }
@@ -48,7 +48,7 @@ pub(super) fn overview(runs: &[RunSummary]) -> Markup {
     }
 }
 
-/// The best of the controllers that show what can be done without touch.
+/// The best of the controllers that keep one number constant.
 struct BlindBound {
     policy: String,
     /// Safety Success, %.
@@ -92,7 +92,7 @@ fn row(run: &RunSummary, bound: Option<&BlindBound>) -> Markup {
     let count = run.run.records.len();
     html! {
         tr {
-            th.text scope="row" { (breakable(&run.method)) @if run.run.is_blind_bound() { span.interval { "constant grip, without touch" } } }
+            th.text scope="row" { (breakable(&run.method)) @if run.run.is_blind_bound() { span.interval { "one constant number" } } }
             td.text.chart data-head="Goal → Safety" { (dumbbell(goal, safety, scores.count(EpisodeCategory::OverLimit) > 0, bound)) }
             td.number data-head="Goal, %" { (rate(goal)) }
             td.number data-head="Safety, %" { @match safety { Some(safety) => b { (rate(safety)) }, None => "N/A" } }

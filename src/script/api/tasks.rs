@@ -34,7 +34,7 @@ pub(crate) const SETTINGS: Type = Type::Map(&Type::Map(&Type::Any));
 pub(crate) const SETTINGS_CLASS: &str = "softvt.Settings";
 
 choice! { ObjectType { "deformable" => Deformable, "rigid" => Rigid } }
-choice! { NeededKnowledge { "nothing" => Nothing, "size" => Size, "touch" => Touch } }
+choice! { NeededKnowledge { "nothing" => Nothing, "size" => Size, "trial" => Trial } }
 choice! { Reduction { "last" => Last, "max" => Max, "min" => Min, "mean" => Mean } }
 choice! { Teacher { "expert" => Expert, "tactile-servo" => TactileServo } }
 choice! { TaskDifference { "object" => Object, "spatial" => Spatial } }
@@ -145,7 +145,7 @@ record! {
         /// Difference between the tasks.
         tasks_differ_in: TaskDifference;
         /// What a controller has to know of an instance to grip it safely, as softvt list suites prints it: "nothing"
-        /// but its kind, its "size", or what only "touch" tells. softvt scripts/blind_bounds.lua estimates it.
+        /// but its kind, its "size", or what only a "trial" tells. softvt scripts/blind_bounds.lua estimates it.
         needs: Option<NeededKnowledge>;
         /// Default number of episodes per task.
         episodes: u32 = Type::Integer(Range::closed(1.0, 1e6)) => Integer(5);
