@@ -78,6 +78,7 @@ pub fn time_step(report: &mut Report) {
     }
     moving(report);
     hand(report);
+    verdicts();
 }
 
 /// Prints the acceleration of the hand along a planned path.
@@ -97,6 +98,29 @@ fn hand(report: &mut Report) {
         found.map(|a| a / path - 1.0),
         1.0,
     );
+}
+
+/// Prints the verdicts at several rates of physics steps.
+fn verdicts() {
+    println!(
+        "\nVerdicts in the hidden suites (`.ci/time-steps` runs the episodes; *turned*: other than at the first rate).\n"
+    );
+    header(&[
+        "suite",
+        "controller",
+        "steps per second",
+        "episodes",
+        "Goal %",
+        "Safety %",
+        "Goal turned",
+        "Safety turned",
+    ]);
+    for one in drives::verdicts() {
+        let counts = [one.goal_turned, one.safety_turned].map(|count| count.to_string());
+        let rates = [one.goal, one.safety].map(|rate| format!("{rate:.1}"));
+        let names = [one.suite, one.controller, one.rate_hz.to_string(), one.episodes.to_string()];
+        row(&[names.as_slice(), &rates, &counts].concat());
+    }
 }
 
 /// Prints what depends on the step: the swing of a lifted body, and the speed of a rolling one.
