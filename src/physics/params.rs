@@ -13,8 +13,8 @@ softvt_common::settings! {
     /// [`World`](super::World) assumes valid ones.
     pub struct PhysicsParams {
         /// Time step. Control runs at 20 Hz independently of it, so it must divide 0.05 s in the benchmark. Limits and
-        /// grip windows are calibrated with the default: below 5 ms, motion is damped less, and the loosest grips of
-        /// the expert slip.
+        /// grip windows are calibrated with the default. A smaller step damps the motion of soft bodies less; that of
+        /// the hand does not depend on it.
         dt: f64 = 1.0 / 60.0, "s", Range::closed(1e-4, 0.05);
         /// Mass-proportional Rayleigh damping of soft bodies (α, as air drag). The paper's engine uses 2.5.
         rayleigh_mass: f64 = 0.0, "1/s", Range::NOT_NEGATIVE;
