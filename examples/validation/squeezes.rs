@@ -90,8 +90,8 @@ pub fn truth(report: &mut Report) {
     heading(
         "Converged truth",
         "Small-strain stiffness between sticking pads (closing of 0.2 mm, no gravity) and D on the 7³ nodes, against meshes \
-         graded to convergence: 620 N/m and 0.212 %/mm for centred 22 mm pads, rows of `truth.jsonl` for others. The peers at \
-         343 nodes are 34 to 41 % too stiff. An offset of 4.1667 mm is half a voxel of resolution 6.",
+         graded to convergence: 620 N/m and 0.212 %/mm for centred 22 mm pads, rows of `truth.jsonl` for others. Drake \
+         and MuJoCo at 343 nodes and 2 ms are 34 to 41 % too stiff. An offset of 4.1667 mm is half a voxel of resolution 6.",
     );
     header(&["resolution", "pad mm", "offset mm", "N/m", "truth", "", "D %/mm", "truth", ""]);
     for (resolution, bound) in [(6, 0.15), (12, 0.15), (18, 0.06), (24, 0.06)] {
@@ -150,7 +150,8 @@ pub fn peers() {
         "Beside the peers",
         "The same squeeze in Drake (linear corotated, 1080 tetrahedra, 2 ms) and MuJoCo (flex, St. Venant–Kirchhoff, same tetrahedra, \
          2 ms), measured outside softvt (`tests/reference/rows/peers.jsonl`); ours at 60 Hz, same 343 nodes. *least det*: det F or \
-         volume ratio.",
+         volume ratio. [performance.md](performance.md#beside-other-simulators) has other simulators, and MuJoCo at other \
+         settings.",
     );
     header(&["gap mm", "who", "holds", "F grip", "F hold", "D hold %", "creep mm/s", "least det"]);
     let all = rows("peers");
@@ -191,7 +192,7 @@ pub fn light(report: &mut Report) {
     heading(
         "Light grasps",
         "*Ratio*: 2 μ F / m(g + 0.577 m/s²) with the reference's static force off the table; a grasp holds exactly where it is \
-         above 1. At 49.8 mm the peers hold what friction cannot carry.",
+         above 1. At 49.8 mm Drake and MuJoCo hold what friction cannot carry.",
     );
     header(&["gap mm", "ratio", "Hz", "holds", "F hold", "D peak / D hold", "force ripple"]);
     let (mut wrong, mut overshoot, mut ripple) = (0.0, Vec::new(), Vec::new());

@@ -1,84 +1,96 @@
-"""CPU time of the squeeze of benches/squeeze.rs with a flex of MuJoCo (pip install mujoco numpy).
+"""The squeeze with a flex of MuJoCo on the CPU (pip install mujoco==4.0.0)."""
 
-A soft cube (edge 50 mm, 343 nodes, 30 kPa, Poisson's ratio 0.4, 300 kg/m³) on a table is gripped by two flat pads, lifted by 100 mm and
-held. Prints CPU seconds per simulated second and the force of a pad as one JSON object per gap.
-"""
-
-import json
-import time
+import sys
+from argparse import ArgumentParser, Namespace
 
 import mujoco
 import numpy as np
 
-EDGE, PAD_HALF, CLEARANCE = 0.05, (5e-3, 11e-3, 11e-3), 2e-3
-SETTLE, GRIP, LIFT, HOLD, RISE, CLOSING = 0.1, 0.25, 1.0, 0.5, 0.1, 0.04
-STEP = 0.004
-NODES = 7
+from scene import BETA, FRICTION, GRAVITY, PAD_EDGE, PAD_THICKNESS, POISSON, Squeeze, arguments, measure
+
+CONTACT = f'condim="3" friction="{FRICTION} 0 0" solref="0.004 1" solimp="0.99 0.999 0.0001"'
+# Stiffness of the drives of the pads, N/m.
+DRIVE = 1e5
 
 
-def pad(name: str) -> str:
-    """A pad that moves along x and z. It is so heavy that contact does not change its prescribed velocity: friction of mocap bodies
-    would not see theirs."""
-    size = " ".join(map(str, PAD_HALF))
-    return f"""<body name="{name}" gravcomp="1"><joint type="slide" axis="1 0 0"/><joint type="slide" axis="0 0 1"/>
-      <geom name="{name}" type="box" size="{size}" mass="1e4"/></body>"""
+def flags(about: str, dt: float, tolerance: float) -> ArgumentParser:
+    """Adds those of MuJoCo's solver."""
+    parser = arguments(about, dt)
+    parser.add_argument("--solver", default="CG", choices=["CG", "Newton"])
+    parser.add_argument("--iterations", type=int, default=50, help="largest number per step")
+    parser.add_argument("--impratio", type=float, default=10.0)
+    parser.add_argument("--tolerance", type=float, default=tolerance)
+    return parser
 
 
-SCENE = f"""
+def numbers(array: np.ndarray) -> str:
+    return " ".join(f"{x:.9g}" for x in array.ravel())
+
+
+def pad(name: str, side: int) -> str:
+    """A pad on drives along z and outwards along x. Mocap bodies would have no velocity in friction."""
+    half = PAD_THICKNESS / 2
+    return f"""<body name="{name}" pos="0 0 0.025" gravcomp="1">
+      <joint name="{name}z" type="slide" axis="0 0 1"/><joint name="{name}x" type="slide" axis="{side} 0 0"/>
+      <geom type="box" size="{half} {PAD_EDGE / 2} {PAD_EDGE / 2}" pos="{side * half} 0 0" mass="1" {CONTACT}/></body>"""
+
+
+def load(cube: Squeeze, options: Namespace) -> tuple[mujoco.MjModel, mujoco.MjData]:
+    """The scene with open pads."""
+    drives = "".join(f'<position joint="{name}" kp="{DRIVE}" kv="{0.02 * DRIVE}"/>' for name in ("leftz", "leftx", "rightz", "rightx"))
+    model = mujoco.MjModel.from_xml_string(f"""
 <mujoco>
-  <option timestep="{STEP}" solver="CG" iterations="100" tolerance="1e-6" integrator="discrete" cone="elliptic" impratio="100"/>
-  <size memory="200M"/>
-  <default><geom solref="{STEP} 1" friction="1.2" condim="3"/></default>
+  <compiler autolimits="true"/>
+  <option timestep="{options.dt}" integrator="discrete" solver="{options.solver}" iterations="{options.iterations}"
+          tolerance="{options.tolerance}" cone="elliptic" impratio="{options.impratio}" gravity="0 0 -{GRAVITY}"/>
+  <size memory="400M"/>
   <worldbody>
-    <geom name="table" type="plane" size="0.5 0.5 0.05"/>
-    {pad("left")}
-    {pad("right")}
-    <flexcomp name="cube" type="grid" dim="3" count="{NODES} {NODES} {NODES}" mass="{300 * EDGE**3}" radius="0.0005"
-              spacing="{EDGE / (NODES - 1)} {EDGE / (NODES - 1)} {EDGE / (NODES - 1)}" pos="0 0 {EDGE / 2 + 0.0005}">
-      <contact solref="{STEP} 1" friction="1.2" condim="3" selfcollide="none"/>
-      <elasticity young="3e4" poisson="0.4" damping="0.002"/>
+    <geom type="plane" size="1 1 0.1" {CONTACT}/>
+    {pad("left", -1)}
+    {pad("right", 1)}
+    <flexcomp name="cube" type="direct" dim="3" mass="{cube.density * cube.volumes.sum()}" radius="0"
+              point="{numbers(cube.nodes)}" element="{numbers(cube.tets)}">
+      <contact selfcollide="none" {CONTACT}/>
+      <elasticity young="{cube.youngs}" poisson="{POISSON}" damping="{BETA}"/>
     </flexcomp>
   </worldbody>
-</mujoco>
-"""
-
-
-def squeeze(model: mujoco.MjModel, gap: float) -> dict:
-    """Runs one squeeze."""
+  <actuator>{drives}</actuator>
+</mujoco>""")
     data = mujoco.MjData(model)
-    closed = SETTLE + (0.5 * EDGE + CLEARANCE - 0.5 * gap) / CLOSING
-    lifted = closed + GRIP
-    end = lifted + LIFT + HOLD
+    for name in ("leftx", "rightx"):
+        data.joint(name).qpos[0] = cube.open
+    data.ctrl[:] = [0, cube.open] * 2
+    mujoco.mj_forward(model, data)
+    return model, data
 
-    def place(at: float) -> np.ndarray:
-        x = max(0.5 * EDGE + CLEARANCE - CLOSING * max(at - SETTLE, 0.0), 0.5 * gap) + PAD_HALF[0]
-        s = min(max((at - lifted) / LIFT, 0.0), 1.0)
-        z = RISE * s**3 * (10 + s * (6 * s - 15)) + 0.5 * EDGE
-        return np.array([-x, z, x, z])
 
-    begin = time.process_time()
-    while data.time < end:
-        now = place(data.time)
-        data.qpos[:4], data.qvel[:4] = now, (place(data.time + STEP) - now) / STEP
-        mujoco.mj_step(model, data)
-    cpu = time.process_time() - begin
-    force, wrench = 0.0, np.zeros(6)
-    left = model.geom("left").id
-    for index in range(data.ncon):
-        if left in data.contact[index].geom:
-            mujoco.mj_contactForce(model, data, index, wrench)
-            force += wrench[0]
-    rise = float(np.mean(data.flexvert_xpos[:, 2])) - 0.5 * EDGE
-    return {
-        "mujoco": mujoco.__version__,
-        "gap_mm": 1e3 * gap,
-        "cpu_per_sim_s": round(cpu / end, 3),
-        "force_n": round(force, 3),
-        "rise_mm": round(1e3 * rise, 1),
-    }
+class Flex:
+    """One world on the CPU."""
+
+    def __init__(self, cube: Squeeze, options: Namespace):
+        self.cube, self.dt, self.steps = cube, options.dt, 0
+        self.model, self.data = load(cube, options)
+
+    def advance(self) -> None:
+        face, rise = self.cube.pads(self.data.time + self.dt)
+        self.data.ctrl[:] = [rise, face] * 2
+        mujoco.mj_step(self.model, self.data)
+        self.steps += 1
+
+    def wait(self) -> None:
+        pass
+
+    def positions(self) -> np.ndarray:
+        return self.data.flexvert_xpos.reshape(1, -1, 3).copy()
+
+    def forces(self) -> np.ndarray:
+        return np.abs(self.data.actuator_force[[1, 3]]).mean(keepdims=True)
 
 
 if __name__ == "__main__":
-    scene = mujoco.MjModel.from_xml_string(SCENE)
-    for width in (0.048, 0.042):
-        print(json.dumps(squeeze(scene, width)), flush=True)
+    # In place of MUJOCO_LOG.TXT.
+    mujoco.set_mju_user_warning(lambda text: print(text, file=sys.stderr))
+    options = flags(__doc__, dt=0.0166666667, tolerance=1e-6).parse_args()
+    for gap in options.gap_mm:
+        cube = Squeeze(1e-3 * gap, options)
+        measure(Flex(cube, options), cube, {"peer": "mujoco", "version": mujoco.__version__})
