@@ -7,5 +7,6 @@ mod mixed;
 mod rigid;
 mod rounded;
 mod scene;
+mod sleep;
 mod soft;
 mod solids;

@@ -7,7 +7,7 @@ use super::{Articulation, StepFailure, World};
 use crate::{
     contact::ColliderMotion,
     fem::{rigid_motion::RigidVelocity, system::StepCoefficients},
-    ids::{ArticulationId, BodyId, LinkId, RigidId, SoftId},
+    ids::{ArticulationId, BodyId, ColliderId, LinkId, RigidId, SoftId},
     joints,
     rigid::{TorqueFreeRotation, torque_free_rotation},
     solver::{BlockIdentity, Endpoint, FrameJacobian, ScalarConstraint, VelocityBlock},
@@ -290,14 +290,14 @@ impl World {
         }
     }
 
+    /// Identifiers of all colliders.
+    pub(super) fn collider_ids(&self) -> impl Iterator<Item = ColliderId> + use<> {
+        (0..self.colliders.len()).map(ColliderId::new)
+    }
+
     /// Identifiers of all rigid bodies.
     pub(super) fn rigid_ids(&self) -> impl Iterator<Item = RigidId> + use<> {
         (0..self.rigid.len()).map(RigidId::new)
-    }
-
-    /// Identifiers of all articulations.
-    pub(super) fn articulation_ids(&self) -> impl Iterator<Item = ArticulationId> + use<> {
-        (0..self.articulations.len()).map(ArticulationId::new)
     }
 
     /// Identifiers of all soft bodies.

@@ -31,6 +31,7 @@ impl World {
         let modulus = model.contact_modulus();
         let mut state = FemState::new(model.clone(), pose);
         state.update_elastic();
+        self.wake_all();
         self.soft.push(SoftBody {
             name: name.to_owned(),
             state,
@@ -99,8 +100,9 @@ impl World {
         self.kinematic[id.index()].next = next;
     }
 
-    /// Places a kinematic frame at `pose` without moving it there.
+    /// Places a kinematic frame at `pose` without moving it there. Wakes all bodies.
     pub fn place_kinematic(&mut self, id: KinematicId, pose: Pose) {
+        self.wake_all();
         self.kinematic[id.index()] = KinematicFrame { pose, next: pose };
     }
 
@@ -120,6 +122,7 @@ impl World {
             BodyId::Soft(_) => false,
         };
         assert!(is_here, "collider {}: {:?} cannot carry it", collider.name, collider.parent);
+        self.wake_all();
         self.colliders.push(collider);
         ColliderId::new(self.colliders.len() - 1)
     }

@@ -52,7 +52,7 @@ use crate::{
     params::PhysicsParams,
     solver::{ContactProblem, Solver, SolverStats},
 };
-use softvt_geometry::{Pose, Vec3};
+use softvt_geometry::{GroupedAabb, Pose, Vec3};
 
 pub use builders::{BodyBuilder, FixedBuilder, KinematicBuilder, RigidBodyBuilder, SoftBodyBuilder};
 pub use penetration::Penetration;
@@ -171,6 +171,12 @@ pub struct World {
     candidates: soft_contacts::Candidates,
     rows: Vec<soft_contacts::SoftRow>,
     rigid_contacts: rigid_contacts::RigidContacts,
+    moving: Vec<GroupedAabb>,
+    // State of sleep.
+    /// Parameters and gravity of the last step.
+    inputs: (PhysicsParams, Vec3),
+    /// Points of colliders whose two sides rest, of the step in which the second fell asleep.
+    resting: Vec<(ColliderId, PatchPoint)>,
 }
 
 impl World {
@@ -259,8 +265,10 @@ impl World {
         &self.soft[id.index()]
     }
 
-    /// Changes the position (m) and velocity (m/s) of each node of a soft body, both in the world frame.
+    /// Changes the position (m) and velocity (m/s) of each node of a soft body, both in the world frame. Wakes all
+    /// bodies.
     pub fn set_soft_motion(&mut self, id: SoftId, mut change: impl FnMut(&mut Vec3, &mut Vec3)) {
+        self.wake_all();
         let body = &mut self.soft[id.index()].state;
         body.x.iter_mut().zip(&mut body.v).for_each(|(x, v)| change(x, v));
         body.update_elastic();
@@ -271,8 +279,9 @@ impl World {
         &self.rigid[id.index()]
     }
 
-    /// A free rigid body, to change its state.
+    /// A free rigid body, to change its state. Wakes all bodies.
     pub fn rigid_mut(&mut self, id: RigidId) -> &mut RigidBody {
+        self.wake_all();
         &mut self.rigid[id.index()]
     }
 
@@ -281,8 +290,12 @@ impl World {
         &self.articulations[id.index()]
     }
 
-    /// An articulation, to change its state or drives.
+    /// An articulation, to change its state or drives. Wakes all bodies, unless it is driven: a driven one keeps those
+    /// near it awake.
     pub fn articulation_mut(&mut self, id: ArticulationId) -> &mut Articulation {
+        if !self.articulation(id).is_driven() {
+            self.wake_all();
+        }
         &mut self.articulations[id.index()]
     }
 

@@ -11,7 +11,7 @@ use super::{
 };
 use crate::{
     contact::{CollisionGeometry, ContactPairId, DetectionLimits, ManifoldPoint},
-    ids::{BodyId, ColliderId},
+    ids::{BodyId, ColliderId, ContactPartner, RigidId},
     solver::{ContactCluster, ContactPoint, Endpoint},
 };
 use softvt_geometry::{Aabb, GroupedAabb, Vec3, convex::Placed, overlapping_pairs};
@@ -147,17 +147,17 @@ impl World {
             let centre_w = (self.motions[smaller.index()].pose * nalgebra::Point3::from(centre)).coords;
             let speed = (motion_a.velocity(&centre_w) - motion_b.velocity(&centre_w)).norm()
                 + (motion_a.angular - motion_b.angular).norm() * radius(smaller);
-            pairs.push(ColliderPair { a, b, margin: self.rigid_margin(speed) });
+            pairs.push(ColliderPair { a, b, margin: self.contact_margin(speed) });
         }
     }
 
     /// Gap below which two surfaces that approach at `speed` (m/s) may touch within the step, m.
-    fn rigid_margin(&self, speed: f64) -> f64 {
+    pub(super) fn contact_margin(&self, speed: f64) -> f64 {
         self.params.margin.max(DetectionLimits::STEPS_AHEAD * self.params.dt * speed)
     }
 
     /// Bounds of a collider over the step. Colliders of one group belong to one body and never touch each other.
-    fn swept_box(&self, id: ColliderId) -> GroupedAabb {
+    pub(super) fn swept_box(&self, id: ColliderId) -> GroupedAabb {
         let (collider, motion) = (self.collider(id), &self.motions[id.index()]);
         let bounds = collider.bounds.transformed(&motion.pose);
         let lever = farthest_corner(&bounds, &motion.origin);
@@ -169,7 +169,7 @@ impl World {
             (BodyId::World | BodyId::Kinematic(_) | BodyId::Soft(_), None) => 0,
             (BodyId::Rigid(id), None) => 1 + id.index() as u32,
         };
-        GroupedAabb { bounds: bounds.loosened(self.rigid_margin(speed)), group }
+        GroupedAabb { bounds: bounds.loosened(self.contact_margin(speed)), group }
     }
 
     fn push_rigid(&mut self, point: &ManifoldPoint, state: &PointState, is_b_known: bool) {
@@ -217,17 +217,12 @@ impl World {
         self.rigid_contacts = contacts;
     }
 
-    /// The other colliders that the colliders of a body touched in the last step.
-    pub(super) fn touching_colliders<'a>(
-        &'a self,
-        is_own: impl Fn(BodyId) -> bool + 'a,
-    ) -> impl Iterator<Item = ColliderId> + 'a {
-        let is_on_body = move |id: ColliderId| is_own(self.collider(id).parent);
-        self.rigid_contacts.states.iter().filter_map(move |state| match state.key {
-            PointKey { a, b, .. } if is_on_body(a) => Some(b),
-            PointKey { a, b, .. } if is_on_body(b) => Some(a),
-            _ => None,
-        })
+    /// True if a rigid body touched anything in the last step.
+    pub(super) fn is_touching(&self, id: RigidId) -> bool {
+        let is_own = |collider: ColliderId| self.collider(collider).parent == id.into();
+        let is_own_partner = |partner| matches!(partner, ContactPartner::Collider(id) if is_own(id));
+        self.rigid_contacts.states.iter().any(|state| is_own(state.key.a) || is_own(state.key.b))
+            || self.rows.iter().any(|row| is_own_partner(row.partner))
     }
 }
 

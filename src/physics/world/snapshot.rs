@@ -130,30 +130,49 @@ impl World {
         }
     }
 
-    /// Contact patch of a collider in the last step.
+    /// Contact patch of a collider in the last step; with a body that sleeps, in the last step in which it was awake.
     pub fn patch(&self, collider: ColliderId) -> ContactPatch {
+        let mut points =
+            self.solved_points(|own, partner| own == collider && !self.are_resting(own, partner));
+        points.extend(self.resting.iter().filter(|(own, _)| *own == collider).cloned());
+        ContactPatch { collider, points: points.into_iter().map(|(_, point)| point).collect() }
+    }
+
+    /// True if neither side of a contact is solved for.
+    pub(super) fn are_resting(&self, collider: ColliderId, partner: ContactPartner) -> bool {
+        let partner = match partner {
+            ContactPartner::Collider(id) => self.collider(id).parent,
+            ContactPartner::Soft(id) => id.into(),
+        };
+        self.is_known(self.collider(collider).parent) && self.is_known(partner)
+    }
+
+    /// The solved points of colliders that press, of each pair of collider and partner that is `wanted`.
+    pub(super) fn solved_points(
+        &self,
+        wanted: impl Fn(ColliderId, ContactPartner) -> bool,
+    ) -> Vec<(ColliderId, PatchPoint)> {
         let (soft, solid) = self.problem.points.split_at(self.rows.len().min(self.problem.points.len()));
-        let own = ContactPartner::Collider(collider);
-        let mut points: Vec<PatchPoint> = Vec::new();
+        let mut points = Vec::new();
         for (row, point) in self.rows.iter().zip(soft) {
-            if row.partner == own && point.normal_impulse > 0.0 {
+            let (ContactPartner::Collider(own), partner) = (row.partner, row.soft.into()) else { continue };
+            if point.normal_impulse > 0.0 && wanted(own, partner) {
                 let model = &self.soft(row.soft).state.model;
                 let area = model.samples[row.sample].surface.area * row.coverage;
                 let face = SampleSupport { group: row.group, weights: point.weights_a };
-                points.push(self.patch_point(collider, row.soft.into(), Some(face), point, 1.0, area));
+                points.push((own, self.patch_point(own, partner, Some(face), point, 1.0, area)));
             }
         }
         for solved in self.rigid_contacts.pressing(solid) {
-            let (other, sign) = match collider {
-                own if own == solved.a => (solved.b, -1.0),
-                own if own == solved.b => (solved.a, 1.0),
-                _ => continue,
-            };
-            let [a, b] = [solved.a, solved.b].map(|id| &self.collider(id).stiffness);
-            let area = solved.point.stiffness / a.in_series(b).normal;
-            points.push(self.patch_point(collider, other.into(), None, solved.point, sign, area));
+            for (own, other, sign) in [(solved.a, solved.b, -1.0), (solved.b, solved.a, 1.0)] {
+                if wanted(own, other.into()) {
+                    let [a, b] = [solved.a, solved.b].map(|id| &self.collider(id).stiffness);
+                    let area = solved.point.stiffness / a.in_series(b).normal;
+                    points.push((own, self.patch_point(own, other.into(), None, solved.point, sign, area)));
+                }
+            }
         }
-        ContactPatch { collider, points }
+        points
     }
 
     /// A solved point in the frame of a collider; `sign` is 1 if its impulse acts on `partner`, −1 if on the collider.

@@ -7,6 +7,7 @@ use crate::{
     fem::{FemState, system::VelocitySystem},
     ids::ContactPartner,
     joints::{JointState, JointTree},
+    params::PhysicsParams,
     rigid::RigidState,
     solver::ScalarConstraint,
 };
@@ -94,7 +95,7 @@ impl SoftBody {
         self.system.factorizations
     }
 
-    /// True while it sleeps: it is skipped until a nearby body moves.
+    /// True while it sleeps: it is skipped until something near it moves or anything is changed.
     pub fn is_asleep(&self) -> bool {
         self.sleep.is_asleep
     }
@@ -105,14 +106,15 @@ impl SoftBody {
 pub struct RigidBody {
     /// Name, for messages and logs.
     pub name: String,
-    /// Pose, velocity and mass properties. Pose and velocity may be set between steps; a velocity wakes the body.
+    /// Pose, velocity and mass properties. Pose and velocity may be set between steps.
     pub state: RigidState,
     pub(super) sleep: SleepState,
     pub(super) contacts: Vec<BodyContact>,
 }
 
 impl RigidBody {
-    /// True while it sleeps: it is then treated as part of the world until something moves near it.
+    /// True while it sleeps: it is then treated as part of the world until something near it moves or anything is
+    /// changed.
     pub fn is_asleep(&self) -> bool {
         self.sleep.is_asleep
     }
@@ -122,11 +124,17 @@ impl RigidBody {
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct SleepState {
     pub is_asleep: bool,
-    /// Time for which the body has been slow, s.
+    /// Time for which the body has been slow and undisturbed, s.
     pub slow_time: f64,
 }
 
 impl SleepState {
+    /// Counts a step at whose end an awake body has this speed (m/s, rad/s); true if it may fall asleep.
+    pub(super) fn is_due(&mut self, speed: f64, params: &PhysicsParams) -> bool {
+        self.slow_time = if speed <= params.sleep_speed { self.slow_time + params.dt } else { 0.0 };
+        !self.is_asleep && self.slow_time >= params.sleep_delay
+    }
+
     pub(super) fn wake(&mut self) {
         *self = Self::default();
     }
@@ -221,8 +229,8 @@ impl Articulation {
         self.drives.iter().any(Option::is_some)
     }
 
-    /// True while it sleeps: its links are then treated as part of the world until something moves near them. A
-    /// driven articulation never sleeps.
+    /// True while it sleeps: its links are then treated as part of the world until something near them moves or
+    /// anything is changed. A driven articulation never sleeps.
     pub fn is_asleep(&self) -> bool {
         self.sleep.is_asleep
     }
