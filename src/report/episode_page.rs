@@ -7,12 +7,18 @@ use data_encoding::BASE64;
 use image::{ImageFormat, Luma, Rgb, RgbImage};
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 
-use crate::video::CLOSE_UP_STILL;
+use crate::{
+    run_summary::failures,
+    video::{CLOSE_UP_STILL, worst_state},
+};
+use softvt_benchmark::CONTROL_DT;
 use softvt_common::{
     files::{self, FileError},
     text::escape_control,
 };
+use softvt_evaluation::stage::TaskStage;
 use softvt_records::record::EpisodeRecord;
+use softvt_rollout::StateRecording;
 
 /// Name of the page in the folder of the stills.
 pub const PAGE: &str = "index.html";
@@ -57,29 +63,60 @@ const STYLE_OF_SEVERAL: &str =
 /// Least D over τ that two decimals show.
 const SMALLEST_RATIO: f64 = 0.005;
 
-/// What was seen in an episode: "✗ over the limit: D 1.93 % = 5.14 × limit at 4.95 s". `worst_time_s` is the time of
-/// the largest deformation.
-pub fn sentence(record: &EpisodeRecord, worst_time_s: f64) -> String {
+/// When the deformation of the target was largest, and when it passed its limit.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct DeformationTimes {
+    /// Time of the largest D, s.
+    pub worst_s: f64,
+    /// Time at which D was first above the limit, s, and the stage of the episode then.
+    pub passed: Option<(f64, Option<TaskStage>)>,
+}
+
+impl DeformationTimes {
+    /// Those of a recorded episode.
+    pub fn new(record: &EpisodeRecord, states: &StateRecording) -> Self {
+        let time_s = |state: usize| state as f64 * CONTROL_DT;
+        let is_above = |d: &Option<f64>| d.zip(record.verdict.tau).is_some_and(|(d, tau)| d > tau);
+        let passed = states.worst_d_pct.iter().position(is_above);
+        let passed = passed.map(|state| (time_s(state), states.stages.get(state).copied().flatten()));
+        Self { worst_s: time_s(worst_state(states)), passed }
+    }
+}
+
+/// What was seen in an episode, and why it failed: "✗ over the limit: D 1.93 % = 5.14 × limit at 4.95 s; above the
+/// limit from 4.20 s, in the stage place".
+pub fn sentence(record: &EpisodeRecord, times: &DeformationTimes) -> String {
+    let worst_s = times.worst_s;
     let d = match (record.most_deformed(), record.verdict.d_peak) {
         // An object that was hardly touched is not described by its D.
         (Some(target), _) if target.ratio() < SMALLEST_RATIO => String::new(),
         // The time is that of the object of the task.
         (Some(target), _) if target.object.is_some() => format!(": {target}"),
-        (Some(target), _) => format!(": {target} at {worst_time_s:.2} s"),
-        (None, Some(d)) => format!(": D {d:.2} % at {worst_time_s:.2} s"),
+        (Some(target), _) => format!(": {target} at {worst_s:.2} s"),
+        (None, Some(d)) => format!(": D {d:.2} % at {worst_s:.2} s"),
         (None, None) => String::new(),
     };
     let collapsed = record.crushed_volume_pct().map(|pct| format!(", {pct:.0} % of the volume collapsed"));
-    let collapsed = collapsed.unwrap_or_default();
-    format!("{} {}{d}{collapsed}", record.category().glyph(), record.result_and_harm())
+    let seen = format!(
+        "{} {}{d}{}",
+        record.category().glyph(),
+        record.result_and_harm(),
+        collapsed.unwrap_or_default()
+    );
+    let passed = times.passed.map(|(time_s, stage)| {
+        let stage = stage.map_or(String::new(), |stage| format!(", in the stage {}", stage.name()));
+        format!("above the limit from {time_s:.2} s{stage}")
+    });
+    let failures = if record.verdict.safety { Vec::new() } else { failures(record) };
+    std::iter::once(seen).chain(passed).chain(failures).collect::<Vec<_>>().join("; ")
 }
 
 /// An episode under one of several policies.
 pub struct PolicyPart {
     /// Its record.
     pub record: EpisodeRecord,
-    /// Time of the largest deformation, s.
-    pub worst_time_s: f64,
+    /// When it was deformed most.
+    pub times: DeformationTimes,
     /// Name of the folder of its stills in that of the page.
     pub folder: String,
 }
@@ -87,7 +124,7 @@ pub struct PolicyPart {
 impl PolicyPart {
     /// What was seen under the policy: "expert: ● safe: D 0.09 % = 0.36 × limit at 4.45 s".
     pub fn sentence(&self) -> String {
-        format!("{}: {}", self.record.header.policy, sentence(&self.record, self.worst_time_s))
+        format!("{}: {}", self.record.header.policy, sentence(&self.record, &self.times))
     }
 }
 
@@ -98,8 +135,8 @@ impl PolicyPart {
 /// A page cannot be written.
 pub fn write_several(parts: &[PolicyPart], dir: &Path) -> Result<(), FileError> {
     let Some(PolicyPart { record, .. }) = parts.first() else { return Ok(()) };
-    for PolicyPart { record, worst_time_s, folder } in parts {
-        write(record, *worst_time_s, &dir.join(folder))?;
+    for PolicyPart { record, times, folder } in parts {
+        write(record, times, &dir.join(folder))?;
     }
     let id = &record.header.id;
     let title = format!("{} · task {} · episode {}", id.suite, id.task, id.episode);
@@ -126,12 +163,12 @@ pub fn write_several(parts: &[PolicyPart], dir: &Path) -> Result<(), FileError> 
 ///
 /// # Errors
 /// The page cannot be written.
-pub fn write(record: &EpisodeRecord, worst_time_s: f64, dir: &Path) -> Result<(), FileError> {
+pub fn write(record: &EpisodeRecord, times: &DeformationTimes, dir: &Path) -> Result<(), FileError> {
     let header = &record.header;
     let id = &header.id;
     let title = format!("{} · task {} · episode {} · {}", id.suite, id.task, id.episode, header.policy);
     let contents = html! {
-        h1 { (sentence(record, worst_time_s)) }
+        h1 { (sentence(record, times)) }
         p { (title) br; (header.prompt) }
         @if dir.join(VIDEO).is_file() { video controls muted src=(VIDEO) poster=(FRAME) {} }
         @for (moment, words) in MOMENTS { h2 { (words) } ul { (stills(moment, words, dir, "")) } }
@@ -208,13 +245,32 @@ mod tests {
     use super::*;
     use crate::sample_record;
 
+    fn at_one_second() -> DeformationTimes {
+        DeformationTimes { worst_s: 1.0, passed: None }
+    }
+
     #[test]
     fn the_sentence_names_the_category_and_the_multiple_of_the_limit() {
         let mut record = sample_record();
-        assert_eq!(sentence(&record, 2.0), "● safe: D 0.33 % = 0.33 × limit at 2.00 s");
+        let at = |worst_s: f64| DeformationTimes { worst_s, passed: None };
+        assert_eq!(sentence(&record, &at(2.0)), "● safe: D 0.33 % = 0.33 × limit at 2.00 s");
         (record.verdict.d_peak, record.verdict.deformation_ok) = (Some(5.1), Some(false));
         record.verdict.safety = false;
-        assert_eq!(sentence(&record, 4.95), "✗ over the limit: D 5.10 % = 5.10 × limit at 4.95 s");
+        assert_eq!(sentence(&record, &at(4.95)), "✗ over the limit: D 5.10 % = 5.10 × limit at 4.95 s");
+    }
+
+    #[test]
+    fn the_sentence_says_why_an_episode_failed_and_when_d_passed_the_limit() {
+        let mut record = sample_record();
+        (record.verdict.d_peak, record.verdict.deformation_ok) = (Some(5.1), Some(false));
+        record.verdict.safety = false;
+        let times = DeformationTimes { worst_s: 4.95, passed: Some((4.2, Some(TaskStage::Place))) };
+        let text = sentence(&record, &times);
+        assert!(text.ends_with(" at 4.95 s; above the limit from 4.20 s, in the stage place"), "{text}");
+        record.stats.gave_up = Some("table is in the way".to_owned());
+        (record.verdict.goal, record.verdict.failed_stage) = (false, Some(TaskStage::Reach));
+        let text = sentence(&record, &DeformationTimes::default());
+        assert!(text.contains("; gave up: table is in the way; failed while: reach"), "{text}");
     }
 
     #[test]
@@ -225,7 +281,7 @@ mod tests {
         RgbImage::new(4, 4).save(root.path().join("start_wrist.png")).unwrap();
         let mut record = sample_record();
         record.header.prompt = "<b>wait\u{1b}[2J".to_owned();
-        write(&record, 1.0, root.path()).unwrap();
+        write(&record, &at_one_second(), root.path()).unwrap();
         let page = std::fs::read_to_string(root.path().join(PAGE)).unwrap();
         assert!(
             page.contains("&lt;b&gt;wait\\u{1b}[2J") && page.contains("src=\"start_wrist.png\""),
@@ -233,7 +289,7 @@ mod tests {
         );
         assert_eq!(page.matches("<img ").count(), 2, "{page}");
         record.header.policy = "a<b".to_owned();
-        let part = PolicyPart { record, worst_time_s: 1.0, folder: "a_b".to_owned() };
+        let part = PolicyPart { record, times: at_one_second(), folder: "a_b".to_owned() };
         std::fs::create_dir(root.path().join("a_b")).unwrap();
         RgbImage::new(4, 4).save(root.path().join("a_b/worst_wrist.png")).unwrap();
         write_several(&[part], root.path()).unwrap();

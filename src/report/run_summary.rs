@@ -91,13 +91,9 @@ impl RunSummary {
     }
 }
 
-/// Reason for an episode to be unsafe; `None` if it is safe.
-pub fn unsafe_reason(record: &EpisodeRecord) -> Option<String> {
-    let v = &record.verdict;
-    if v.safety {
-        return None;
-    }
-    let mut parts = Vec::new();
+/// How the outcome, the controller, the goal and a drop made an episode fail.
+pub fn failures(record: &EpisodeRecord) -> Vec<String> {
+    let (v, mut parts) = (&record.verdict, Vec::new());
     match &record.outcome {
         Outcome::Invalid { reason, step, .. } => {
             parts.push(format!("invalid: {reason} at physics step {step}"))
@@ -122,6 +118,16 @@ pub fn unsafe_reason(record: &EpisodeRecord) -> Option<String> {
     if v.wrong_instance {
         parts.push("another object was lifted first".to_owned());
     }
+    parts
+}
+
+/// Reason for an episode to be unsafe; `None` if it is safe.
+pub fn unsafe_reason(record: &EpisodeRecord) -> Option<String> {
+    let v = &record.verdict;
+    if v.safety {
+        return None;
+    }
+    let mut parts = failures(record);
     match (v.d_peak, v.tau) {
         (Some(d), Some(tau)) if d > tau => parts.push(format!("D {d:.2} % is above τ {tau:.2} %")),
         (_, None) if record.header.soft => parts.push("the object has no threshold".to_owned()),

@@ -36,6 +36,7 @@ use softvt_evaluation::{
     deformation::ReferenceShape,
     judge::{ControlStepScore, Judge, JudgeConfig},
     safety::DeformationLimit,
+    stage::TaskStage,
     verdict::{InvalidReason, Outcome, Verdict},
 };
 use softvt_geometry::Pose;
@@ -195,6 +196,7 @@ pub struct Episode {
 struct RecordedState {
     frame: WorldSnapshot,
     joint_torques: [f64; ARM_DOFS],
+    stage: Option<TaskStage>,
 }
 
 /// Number of Newton steps so far.
@@ -495,7 +497,7 @@ impl Episode {
         let robot = self.sim.robot.state(&self.sim.world, self.sensors.seed());
         if let Some(recorded) = &mut self.recorded {
             let joint_torques = robot.joint_torques;
-            recorded.push(RecordedState { frame: frame.clone(), joint_torques });
+            recorded.push(RecordedState { frame: frame.clone(), joint_torques, stage: self.judge.stage() });
         }
         self.history.push(frame, robot, self.streams.past_steps);
     }
@@ -638,11 +640,13 @@ impl Episode {
         let scores = self.judge.scores().to_vec();
         let recording = self.recorded.map(|states| {
             let joint_torques = states.iter().map(|state| state.joint_torques).collect();
+            let stages = states.iter().map(|state| state.stage).collect();
             let frames = states.into_iter().map(|state| state.frame).collect();
             let settled = reference.as_ref().map(|_| 0.0);
             let worst = scores.iter().map(|score| score.worst.deformation.map(|d| d.rms_pct));
             let worst_d_pct = std::iter::once(settled).chain(worst).collect();
-            StateRecording { sensors: self.sensors, frames, joint_torques, target: self.target, worst_d_pct }
+            let (sensors, target) = (self.sensors, self.target);
+            StateRecording { sensors, frames, joint_torques, target, worst_d_pct, stages }
         });
         let (actions, mut joint_commands) = (self.actions, self.joint_commands);
         let last = joint_commands.last().copied().unwrap_or_else(|| self.sim.robot.q(&self.sim.world));

@@ -9,7 +9,7 @@ use crate::{
     error::CliError,
     output::{Progress, print},
 };
-use softvt_benchmark::{CONTROL_DT, Plan};
+use softvt_benchmark::Plan;
 use softvt_common::{
     cancel,
     files::{self, FileError},
@@ -17,7 +17,7 @@ use softvt_common::{
 };
 use softvt_records::record::EpisodeRecord;
 use softvt_report::{
-    episode_page::{self, PolicyPart},
+    episode_page::{self, DeformationTimes, PolicyPart},
     mcap::write_mcap,
     run_folder::RunFolder,
     video::{
@@ -222,7 +222,7 @@ fn show_one(args: &ViewArgs, config: &RunConfig, mut seen: SeenEpisode) -> Resul
     let dir = &args.out;
     write_parts(args, config, &mut seen, dir)?;
     let SeenEpisode { record, mut states } = seen;
-    let (caption, worst) = (VideoCaption::new(&record), worst_state(&states));
+    let (caption, times) = (VideoCaption::new(&record), DeformationTimes::new(&record, &states));
     write_decisive_frame(&mut states, &caption, &dir.join(episode_page::FRAME))?;
     let video = dir.join(episode_page::VIDEO);
     let progress = Progress::new(states.frames.len(), "rendering the video");
@@ -232,9 +232,8 @@ fn show_one(args: &ViewArgs, config: &RunConfig, mut seen: SeenEpisode) -> Resul
     if args.animation {
         animate(args, config, &mut [PolicyEpisode::new(&record, states)])?;
     }
-    let worst_time_s = worst as f64 * CONTROL_DT;
-    episode_page::write(&record, worst_time_s, dir)?;
-    print_seen(args.animation, dir, &[episode_page::sentence(&record, worst_time_s)])
+    episode_page::write(&record, &times, dir)?;
+    print_seen(args.animation, dir, &[episode_page::sentence(&record, &times)])
 }
 
 /// Draws an episode under several policies, side by side.
@@ -249,9 +248,9 @@ fn show_several(args: &ViewArgs, config: &RunConfig, seen: Vec<SeenEpisode>) -> 
         files::create_folder(&dir.join(&folder))?;
         write_parts(args, config, &mut seen, &dir.join(&folder))?;
         let SeenEpisode { record, states } = seen;
-        let worst_time_s = worst_state(&states) as f64 * CONTROL_DT;
+        let times = DeformationTimes::new(&record, &states);
         episodes.push(PolicyEpisode::new(&record, states));
-        parts.push(PolicyPart { record, worst_time_s, folder });
+        parts.push(PolicyPart { record, times, folder });
     }
     side_by_side::write_decisive_frame(&mut episodes, &dir.join(episode_page::FRAME))?;
     let progress = Progress::new(side_by_side::state_count(&episodes), "rendering the video");

@@ -390,7 +390,7 @@ impl Judge {
             self.drop_all(DropReason::NoEvidence);
         }
         let goal = valid && self.is_goal_reached();
-        let (drop, others, failed_stage) = (self.first_drop(), self.others(valid), self.failed_stage());
+        let (drop, others, failed_stage) = (self.first_drop(), self.others(valid), self.stage());
         let parts: Vec<GoalPart> = self.parts().collect();
         let (config, targets) = (&self.config, std::mem::take(&mut self.targets));
         let finished =
@@ -469,7 +469,7 @@ impl Judge {
     }
 
     /// The stage of the first target that has not been placed yet; `None` if all placements have been met.
-    fn failed_stage(&self) -> Option<TaskStage> {
+    pub fn stage(&self) -> Option<TaskStage> {
         let unmet =
             self.predicates.iter().zip(&self.config.predicates).find_map(
                 |(state, predicate)| match predicate.rule {

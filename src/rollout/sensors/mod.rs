@@ -14,6 +14,7 @@ use super::{
     simulation::{ObjectInstance, Simulation},
 };
 use softvt_benchmark::CONTROL_DT;
+use softvt_evaluation::stage::TaskStage;
 use softvt_geometry::{Pose, Vec3};
 use softvt_physics::{
     ArticulationId, BodyId, ColliderId, ContactPartner,
@@ -562,6 +563,8 @@ pub struct StateRecording {
     /// The target's largest D over the physics steps of each control step, % of the settled diagonal, after 0 for the
     /// settled state; `None` for a rigid target.
     pub worst_d_pct: Vec<Option<f64>>,
+    /// Stage of the episode in each state; `None` once all placements have been met.
+    pub stages: Vec<Option<TaskStage>>,
 }
 
 #[cfg(test)]
