@@ -152,7 +152,7 @@ local function press_asset(name, o)
   tell_doubts(asset)
   local sweep = press.sweep(asset, 1e-3 * o.step_mm)
   append(rows, "sweep", name, sweep.rows)
-  append(rows, "end", name, { { ended = sweep.ended, stable_strain = sweep.stable_strain } })
+  append(rows, "end", name, { { ended = sweep.ended, stable_strain = sweep.stable_strain, tilt_deg = sweep.tilt_deg } })
   local found = envelope(name, rows, o)
   local at_tau, contact = found.window.tight.width_mm, found.width_contact_mm
   if at_tau and contact then
@@ -233,10 +233,25 @@ local function no_limit(name, found)
   )
 end
 
--- Why an asset has no window, from the first line of its envelope.
-local function problem_of(found)
+-- Tilt from which on an object has fallen over, degrees.
+local FALLEN = 45
+
+-- How an asset has settled otherwise than modelled; nil if it has not.
+local function tilted(rows, name)
+  for _, row in ipairs(rows) do
+    if row.asset == name and row.tilt_deg then
+      local verb = row.tilt_deg < FALLEN and "tilts" or "falls over,"
+      return ("it %s by %.0f° when it settles, and was pressed as it lies"):format(verb, row.tilt_deg)
+    end
+  end
+end
+
+-- Why an asset has no window, from the first line of its envelope and how it has tilted.
+local function problem_of(found, tilt)
   local line = found.text:match "[^\n]*"
-  if found.censored then return ("%s (the press ended early: %s)"):format(line, found.censored) end
+  if found.censored then line = ("%s (the press ended early: %s)"):format(line, found.censored) end
+  if tilt then return ("%s: %s; model it as it comes to rest"):format(line, tilt) end
+  if found.censored then return line end
   return line .. "; give it more friction, less density, or a larger collapse_strain or damage_strain"
 end
 
@@ -253,7 +268,7 @@ local function finish(rows, o)
       files[at .. ".json"], files[at .. ".sweep.jsonl"], files[at .. ".svg"], files[at .. ".txt"] =
         one.json, one.sweep, one.plot, one.text
       found[name] = one
-      if not one.window.extent_mm then problems[#problems + 1] = problem_of(one) end
+      if not one.window.extent_mm then problems[#problems + 1] = problem_of(one, tilted(rows, name)) end
     end
   end
   if asset_names.has_all_soft(found) then

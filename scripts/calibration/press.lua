@@ -133,7 +133,6 @@ function Bench:both_touch() return math.min(self:force(1), self:force(2)) > tria
 -- scale, resolution, youngs_factor, density_factor and strain_factor.
 function press.bench(asset, change, offset)
   local made = instance(asset, change or {})
-  local object = made.object
   local world = softvt.world { sleeping = false }
   world:static {
     name = "table",
@@ -148,32 +147,27 @@ function press.bench(asset, change, offset)
     friction = made.friction,
     position = made.position,
   }
-  local problem, stable_strain = grasp.problem(object), body:stable_strain()
+  local bench = setmetatable({ world = world, dt = world:dt(), min_det_f = math.huge, pads = {}, body = body }, Bench)
+  local stable_strain = body:stable_strain()
+  local _, rests = bench:rest(SETTLE_SPEED, SETTLE_S)
+  if not rests then
+    return nil, "it does not come to rest" .. (bench.problem and ": " .. bench.problem or ""), stable_strain
+  end
+  -- One that has tilted or fallen over is pressed as it lies.
+  local object, lying = made.object, body:lying()
+  if lying then
+    object.size, object.centre, object.yaw, bench.tilt = lying.size, lying.centre, lying.yaw, lying.tilt
+  end
+  local problem = grasp.problem(object)
   if problem then return nil, "it " .. problem, stable_strain end
   local yaw = grasp.hand_yaw(object)
-  local bench = setmetatable({
-    world = world,
-    dt = world:dt(),
-    object = object,
-    min_det_f = math.huge,
-    pads = {},
-    width = grasp.width(object) + 2 * CLEARANCE,
-    rise = 0,
-    axis = { -math.sin(yaw), math.cos(yaw) },
-    at = grasp.pose(object, grasp.height(object), offset).position,
-    body = body,
-  }, Bench)
+  bench.object, bench.axis = object, { -math.sin(yaw), math.cos(yaw) }
+  bench.at = grasp.pose(object, grasp.height(object), offset).position
+  bench.width, bench.rise = grasp.width(object) + 2 * CLEARANCE, 0
   for index, side in ipairs { -1, 1 } do
     local facing = yaw - side * math.pi / 2
     local solid = world:gel_pad { position = bench:pad_position(side), axis_angle = { 0, 0, facing } }
     bench.pads[index] = { side = side, facing = facing, solid = solid }
-  end
-  bench:place(bench.width, 0)
-  local _, rests = bench:rest(SETTLE_SPEED, SETTLE_S)
-  if not rests then
-    return nil,
-      "it does not come to rest between the open pads" .. (bench.problem and ": " .. bench.problem or ""),
-      stable_strain
   end
   bench.body:set_reference "now"
   return bench, nil, stable_strain
@@ -210,12 +204,13 @@ local function find_contact(bench, step)
 end
 
 -- Presses from first contact inward in steps of `step` (m) until the 95th percentile of the strain has reached the
--- stable strain, or the press is no longer stable. Returns { rows, stable_strain, ended }: `ended` says why the sweep
--- ended if the rows do not tell.
+-- stable strain, or the press is no longer stable. Returns { rows, stable_strain, ended, tilt_deg }: `ended` says why
+-- the sweep ended if the rows do not tell, `tilt_deg` by how much the object has tilted while it settled, if it has.
 function press.sweep(asset, step, change)
   local bench, problem, stable_strain = press.bench(asset, change)
   local sweep = { rows = {}, stable_strain = stable_strain, ended = problem }
   if not bench then return sweep end
+  sweep.tilt_deg = bench.tilt and math.deg(bench.tilt)
   local rows, width, index = sweep.rows, nil, nil
   width, sweep.ended = find_contact(bench, CONTACT_STEP)
   while width and width > 0 do

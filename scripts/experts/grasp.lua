@@ -242,20 +242,23 @@ local function first_contact(scene, pose, others)
   return STROKE - 2 * math.max(0, (scene:clearance(pose, { width = STROKE, ignore = others })))
 end
 
--- Returns the best grasp: { pose, width, is_nominal, closure, clearance }. `width` is the distance of the gels at first
--- contact (m), `closure` that of the approach, as open as possible, and `clearance` that of the fingers (m), negative
--- if the hand would touch something. No other object may be between the fingers as they close: a finger outside a
--- drawer's front would pull the drawer along.
+-- Returns the best grasp: { pose, width, is_nominal, closure, clearance, nearest }. `width` is the distance of the gels
+-- at first contact (m), `closure` that of the approach, as open as possible, and `clearance` that of the fingers from
+-- the object `nearest` (m), negative if the hand would touch it. No other object may be between the fingers as they
+-- close: a finger outside a drawer's front would pull the drawer along.
 function grasp.choose(scene, object, height, offset)
   local best
   local others, ignore = others_than(object, scene), object.hints.grasp_rim_m and {} or { object.name }
   for _, candidate in ipairs(candidates(object, height, offset)) do
-    local pose, clearance = candidate.pose, math.huge
+    local pose, clearance, nearest = candidate.pose, math.huge, nil
     local width = candidate.is_nominal and grasp.width(object) or first_contact(scene, pose, others)
     -- Narrowest opening first: the clearance of a closing motion is that of its narrowest point.
     local openings = { grasp.clear_closure(object, 0.005, width), grasp.clear_closure(object, 0.010, width), 0 }
     for _, opening in ipairs(openings) do
-      clearance = math.min(clearance, (scene:clearance(pose, { width = STROKE * (1 - opening), ignore = ignore })))
+      local distance, name = scene:clearance(pose, { width = STROKE * (1 - opening), ignore = ignore })
+      if distance < clearance then
+        clearance, nearest = distance, name
+      end
       -- Clearance beyond the required one has no value.
       local score = math.min(clearance, FINGER_CLEARANCE) * 1e3 - 0.1 * candidate.cost - opening
       if not best or score > best.score then
@@ -265,6 +268,7 @@ function grasp.choose(scene, object, height, offset)
           is_nominal = candidate.is_nominal,
           closure = opening,
           clearance = clearance,
+          nearest = nearest,
           score = score,
         }
       end

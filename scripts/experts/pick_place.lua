@@ -60,7 +60,10 @@ local function pick(arm, scene, spec, pace, share, close)
   local height = grasp.height(object)
   local chosen = grasp.choose(scene, object, height, { spread(grasp.SPREAD), spread(grasp.SPREAD) })
   local at, opening = chosen.pose, chosen.closure
-  if chosen.clearance < 0 then return nil, "leaves no clearance for the hand" end
+  if chosen.clearance < 0 then
+    local reason = "leaves no clearance for the hand: %s is %.1f mm in its way"
+    return nil, reason:format(chosen.nearest, -1e3 * chosen.clearance)
+  end
   local over = route.approach_height(scene, arm.pose.position, at, 0.05, FINGER_CLEARANCE)
   arm:move_to(arm.target:at { arm.target.x, arm.target.y, math.max(over, arm.target.z) }, { speed = 0.4 * pace })
   arm:move_to(at:at { at.x, at.y, over }, { speed = 0.4 * pace, closure = opening })

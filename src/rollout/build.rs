@@ -201,6 +201,7 @@ fn add(
         colliders,
         model: fem_model,
         bounds: cache.bounds(&asset.shape),
+        settled: None,
         part: None,
     });
     instances.extend(parts);
@@ -241,6 +242,7 @@ fn add_articulated(
             colliders: vec![world.add_collider(collider)],
             model: None,
             bounds: cache.bounds(&part.asset.shape),
+            settled: None,
             part: Some(ArticulatedPart { object: base, name: part.name.clone(), joint: part.joint.clone() }),
         }
     });

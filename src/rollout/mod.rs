@@ -88,6 +88,7 @@ mod scene_warnings;
 mod sensor_assets;
 mod sensor_noise;
 mod sensors;
+mod settled_box;
 mod shared_cache;
 mod simulation;
 mod soft_model;
@@ -109,6 +110,7 @@ pub use sensors::{
     BodyConfiguration, CAMERA_IMAGE_SUFFIXES, CloseUp, Proprioception, Sensors, StateRecording,
     TACTILE_IMAGE_SUFFIXES, TACTILE_IMAGES, check_sensors, strain_colour,
 };
+pub use settled_box::SettledBox;
 pub use simulation::{ArticulatedPart, ObjectInstance, SettleError, Simulation, state_hash};
 pub use soft_model::{cost_warning, soft_model};
 pub use trace::{ObjectTrace, StepTrace};

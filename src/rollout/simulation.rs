@@ -4,7 +4,13 @@ use std::sync::Arc;
 
 use sha2::{Digest, Sha256};
 
-use super::{asset_cache::AssetCache, build, build_error::SceneBuildError, robot_instance::RobotInstance};
+use super::{
+    asset_cache::AssetCache,
+    build,
+    build_error::SceneBuildError,
+    robot_instance::RobotInstance,
+    settled_box::{SettledBox, lean},
+};
 use softvt_benchmark::CONTROL_DT;
 use softvt_common::cancel;
 use softvt_common::text::hex;
@@ -56,6 +62,8 @@ pub struct ObjectInstance {
     pub model: Option<Arc<FemModel>>,
     /// Bounds of the shape at rest, object frame. For a part: that of the whole object with all joints at 0.
     pub bounds: Aabb,
+    /// How it lies, if it has settled otherwise than its asset is modelled.
+    pub settled: Option<SettledBox>,
     /// The part, if this is not a whole object.
     pub part: Option<ArticulatedPart>,
 }
@@ -199,7 +207,25 @@ impl Simulation {
                 return Err(self.unsettled(object, speed));
             }
         }
+        for index in 0..self.objects.len() {
+            self.objects[index].settled = self.settled_box(&self.objects[index]);
+        }
         Ok(())
+    }
+
+    /// How an object lies that does not rest as modelled.
+    fn settled_box(&self, object: &ObjectInstance) -> Option<SettledBox> {
+        let soft = match object.body {
+            BodyId::Soft(id) => Some(&self.world.soft(id).state),
+            BodyId::Rigid(_) => None,
+            BodyId::World | BodyId::Kinematic(_) | BodyId::Link(_) => return None,
+        };
+        SettledBox::new(&object.asset.shape, &self.pose(object), soft)
+    }
+
+    /// Angle by which an object leans from how it was placed, rad.
+    pub fn tilt(&self, object: &ObjectInstance) -> f64 {
+        lean(&self.pose(object), &object.start_w.rotation.inverse_transform_vector(&Vec3::z()))
     }
 
     /// The error about an object that moves at `speed` (m/s) after the time limit.
@@ -224,21 +250,28 @@ impl Simulation {
         speeds.reduce(|best, next| if next.1 > best.1 { next } else { best })
     }
 
-    /// Speed of the fastest point of an object, m/s. For rigid bodies and parts: that of the centre plus 0.1 m
-    /// times the angular velocity.
+    /// Speed of the fastest point of an object, m/s: of the fastest node of a soft body, of the fastest corner of the
+    /// bounding box of a rigid body or part.
     pub fn speed(&self, object: &ObjectInstance) -> f64 {
+        let of_corners = |origin: Vec3, linear: Vec3, angular: Vec3| {
+            let (pose, Aabb { min, max }) = (self.pose(object), object.bounds);
+            let corners = (0..8).map(|corner| {
+                let at = Vec3::from_fn(|axis, _| if corner >> axis & 1 == 0 { min[axis] } else { max[axis] });
+                (linear + angular.cross(&((pose * nalgebra::Point3::from(at)).coords - origin))).norm()
+            });
+            corners.fold(0.0, f64::max)
+        };
         match object.body {
             BodyId::Soft(index) => self.world.soft(index).state.max_speed(),
             BodyId::Rigid(index) => {
                 let body = &self.world.rigid(index).state;
-                body.v.norm() + 0.1 * body.w.norm()
+                of_corners(body.pose_w.translation.vector, body.v, body.w)
             }
             BodyId::Link(link) => {
                 let articulation = self.world.articulation(link.articulation);
                 let (tree, poses) = (articulation.tree(), articulation.poses());
                 let velocity = joints::velocities(tree, poses, articulation.state.v.as_slice())[link.index];
-                let centre = self.centre(object);
-                velocity.at(&poses[link.index], &centre).norm() + 0.1 * velocity.angular.norm()
+                of_corners(poses[link.index].translation.vector, velocity.linear, velocity.angular)
             }
             BodyId::World | BodyId::Kinematic(_) => 0.0,
         }

@@ -236,3 +236,22 @@ fn a_calibration_refuses_what_does_nothing_and_what_would_replace_the_limits() {
         "{message}"
     );
 }
+
+#[test]
+fn an_object_that_falls_over_before_the_press_is_told_so() {
+    let project = brick("collapse_strain = 0.002");
+    let upright = "softvt.shape.box { size = { 0.04, 0.03, 0.024 } }:round(0.003)";
+    let cone = "softvt.shape.lathe { corners = { { 0, 0 }, { 0.002, 0 }, { 0.014, 0.02 }, { 0, 0.034 } } }:round(0.001)";
+    let text = project.text("assets/brick.lua");
+    assert!(text.contains(upright), "{text}");
+    project.write("assets/brick.lua", text.replace(upright, cone).as_bytes());
+    let message = quick(&project, "run").experiment().1.expect_err("no window");
+    assert!(
+        message.contains("brick: no safe window: ") && message.contains(": it falls over, by "),
+        "{message}"
+    );
+    assert!(
+        message.contains("model it as it comes to rest") && !message.contains("more friction"),
+        "{message}"
+    );
+}

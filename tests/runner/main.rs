@@ -37,5 +37,6 @@ mod shut_hand;
 mod stacking;
 mod support;
 mod tactile_forces;
+mod tilted_objects;
 mod turned_grasp;
 mod varied_suites;

@@ -600,8 +600,9 @@ output! {
         asset: "string" = object.asset.name.as_str();
         /// Centre of its bounding box, world frame, m.
         centre: "number[]" = lua.create_sequence_from(object.centre_w.iter().copied())?;
-        /// Edge lengths of its bounding box at rest, m.
-        size: "number[]" = lua.create_sequence_from(object.bounds.size().iter().copied())?;
+        /// Edge lengths of its bounding box at rest, m: along the axes of its shape, or, if it has tilted by 5° or more
+        /// while it settled, of the upright box about it as it lay then, longer horizontal side first.
+        size: "number[]" = lua.create_sequence_from(object.size.iter().copied())?;
         /// Size relative to that of its asset. `size` and hints in metres are those of the object itself.
         scale: "number" = object.scale;
         /// Young's modulus relative to that of its asset; nil unless soft.
@@ -612,7 +613,7 @@ output! {
         strain_factor: "number?" = object.strain_factor;
         /// Static friction of its coating, which is that of every pair with it; nil without one.
         coating: "number?" = object.coating;
-        /// Rotation about the vertical, rad.
+        /// Rotation of that box about the vertical, rad.
         yaw: "number" = object.yaw;
         /// Numbers of its asset for experts; those whose names end in _m are lengths and follow the scale.
         hints: "table<string, number>" = lua.create_table_from(

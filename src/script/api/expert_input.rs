@@ -48,9 +48,11 @@ pub(crate) struct ObjectView {
     pub pose_w: Pose,
     /// Bounds of its shape at rest, object frame.
     pub bounds: Aabb,
-    /// Centre of its bounding box, world frame, m.
+    /// Edge lengths of its bounding box, upright as it has settled, m.
+    pub size: Vec3,
+    /// Centre of that box, world frame, m.
     pub centre_w: Vec3,
-    /// Rotation about the vertical, rad.
+    /// Rotation of that box about the vertical, rad.
     pub yaw: f64,
     /// Joint of a part.
     pub joint: Option<JointView>,
@@ -248,8 +250,13 @@ pub(crate) fn expert_view(sim: &Simulation, time_s: f64) -> ExpertView {
 fn object_view(sim: &Simulation, object: &ObjectInstance, name: &str) -> ObjectView {
     let pose = sim.pose(object);
     let bounds = object.bounds;
-    let centre_w = (pose * nalgebra::Point3::from(bounds.centre())).coords;
-    let x = pose.rotation * Vec3::x();
+    // The box of an object that rests as modelled is that of its shape.
+    let (box_w, own) = match object.settled {
+        Some(settled) => (pose * settled.frame_o, settled.bounds),
+        None => (pose, bounds),
+    };
+    let centre_w = (box_w * nalgebra::Point3::from(own.centre())).coords;
+    let x = box_w.rotation * Vec3::x();
     let placed = sim.scene.objects.iter().find(|placed| placed.name == object.name);
     ObjectView {
         name: name.to_owned(),
@@ -262,6 +269,7 @@ fn object_view(sim: &Simulation, object: &ObjectInstance, name: &str) -> ObjectV
         nominal: placed.map(|placed| placed.nominal.clone()),
         pose_w: pose,
         bounds,
+        size: own.size(),
         centre_w,
         yaw: x.y.atan2(x.x),
         joint: joint_view(sim, object),

@@ -164,6 +164,7 @@ pub(crate) static CLASSES: &[&Class] = &[
     simulation::LuaSimulation::CLASS,
     &simulation::measurements::CLASS,
     &simulation::tactile_table::CLASS,
+    &world::lying_table::CLASS,
     &envelope::window_end_table::CLASS,
     &envelope::window_table::CLASS,
     &envelope::envelope_table::CLASS,

@@ -25,7 +25,7 @@ use softvt_common::{
     text::{format_number, significant},
 };
 use softvt_evaluation::deformation::{Deformation, ReferenceShape};
-use softvt_geometry::{Pose, Quat, Vec3};
+use softvt_geometry::{Pose, Quat, Vec3, shape::Shape};
 use softvt_physics::{
     BodyId, ColliderId, ContactPartner, KinematicId, PhysicsParams, SoftId, World,
     contact::{Collider, Friction, SurfaceStiffness},
@@ -33,7 +33,7 @@ use softvt_physics::{
     world::{ContactSummary, Penetration, SoftBody, StepFailure},
 };
 use softvt_robot::{PadSpec, pads::PadSurface};
-use softvt_rollout::{MAX_OVERLAP, soft_model};
+use softvt_rollout::{MAX_OVERLAP, SettledBox, soft_model};
 use softvt_scene::SoftMaterial;
 
 /// Approximate memory of a world and of one of its solids.
@@ -134,6 +134,8 @@ impl fmt::Display for Timing {
 /// A world with its reference shapes and its timing.
 struct Inner {
     world: World,
+    /// Shapes of the soft bodies.
+    shapes: Vec<Shape>,
     references: Vec<ReferenceShape>,
     strains: Vec<StrainMeter>,
     stable_strains: Vec<Option<f64>>,
@@ -206,6 +208,7 @@ functions! {
             let gravity = gravity.map_or(softvt_physics::STANDARD_GRAVITY, Vec3::from);
             LuaWorld(Arc::new(Mutex::new(Inner {
                 world: World::new(params, gravity),
+                shapes: Vec::new(),
                 references: Vec::new(),
                 strains: Vec::new(),
                 stable_strains: Vec::new(),
@@ -252,6 +255,7 @@ impl LuaWorld {
         let reference = ReferenceShape::new(&model.mesh.nodes, &model.mass).map_err(|e| wrong(&e))?;
         let strains = StrainMeter::new(&model, StrainLimits::default());
         let id = inner.world.add_soft(name, model, Some(Arc::new(shape.clone())), &pose, friction);
+        inner.shapes.push(shape.clone());
         inner.references.push(reference);
         inner.strains.push(strains);
         inner.stable_strains.push(body.stable_strain());
@@ -407,6 +411,20 @@ fn list(lua: &Lua, vector: &Vec3) -> mlua::Result<mlua::Table> {
     lua.create_sequence_from(vector.iter().copied())
 }
 
+output! {
+    /// The upright box, along its narrowest side, about a soft body that has tilted.
+    fn lying_table(lua, frame_w: &Pose, settled: &SettledBox) -> "softvt.Lying" as "lying" {
+        /// Angle between the vertical and the z axis of its shape, rad.
+        tilt: "number" = settled.tilt;
+        /// Centre of the box, m.
+        centre: "number[]" = list(lua, &(frame_w * nalgebra::Point3::from(settled.bounds.centre())).coords)?;
+        /// Edge lengths of the box, longer horizontal side first, m.
+        size: "number[]" = list(lua, &settled.bounds.size())?;
+        /// Rotation of the box about the vertical, rad.
+        yaw: "number" = frame_w.rotation.euler_angles().2;
+    }
+}
+
 class! {
     /// A soft body of a world.
     LuaBody: "softvt.Body" {
@@ -443,6 +461,14 @@ class! {
             /// Returns the share of the volume, %, with a compressive strain above `strain`.
             fn volume_beyond_pct(_, this, strain: f64 = STRAIN) -> ["number"] {
                 100.0 * this.strain(|meter, state| meter.share_beyond(state, strain))
+            }
+            /// Returns how the body lies if it has tilted by 5° or more from its modelled shape, else nil.
+            fn lying(lua, this) -> ["softvt.Lying?"] {
+                let inner = lock(&this.world);
+                let (state, shape) = (&inner.world.soft(this.id).state, &inner.shapes[this.id.index()]);
+                let (pose, _pause) = (state.mean_pose(), inner.clock.pause());
+                let settled = SettledBox::new(shape, &pose, Some(state));
+                settled.map(|settled| lying_table(lua, &(pose * settled.frame_o), &settled)).transpose()?
             }
             /// Returns the size of the bounding box of the nodes, m.
             fn extent(lua, this) -> ["number[]"] { list(lua, &this.deformation(lua)?.bbox_m)? }

@@ -21,6 +21,7 @@ fn ball() -> ObjectView {
     ObjectView {
         name: "ball".into(),
         bounds: shape.bounds(),
+        size: shape.bounds().size(),
         asset: Arc::new(Asset {
             name: "ball".into(),
             shape,
