@@ -3,6 +3,7 @@
 use std::{
     collections::{BTreeMap, BTreeSet},
     path::PathBuf,
+    sync::Mutex,
 };
 
 use crate::{
@@ -15,10 +16,14 @@ use crate::{
     suite_run::SuiteRun,
 };
 use softvt_benchmark::{ObjectType, ShiftValue, Suite, Task};
-use softvt_common::{cancel, parallel, text::format_number};
-use softvt_geometry::Vec3;
+use softvt_common::{
+    cancel,
+    parallel::{self, lock},
+    text::format_number,
+};
+use softvt_geometry::{Aabb, Vec3};
 use softvt_rollout::{AssetCache, SensorAssets, scene_warnings};
-use softvt_scene::{Body, Scene};
+use softvt_scene::{Body, Object, Scene};
 use softvt_script::{LoadedScript, SceneChanges};
 
 /// Checks suites one after the other. Those that share assets load them once.
@@ -27,6 +32,10 @@ pub struct SuiteChecker<'a> {
     script: &'a LoadedScript,
     scenes: ScenePool<'a>,
     assets: AssetCache,
+    /// Those of scenes that settle, whose masses and contacts are not approximate.
+    settled_assets: AssetCache,
+    /// Fingerprints of the assets that have settled in a scene.
+    settled: Mutex<BTreeSet<String>>,
     sensor_assets: SensorAssets,
 }
 
@@ -34,15 +43,24 @@ impl<'a> SuiteChecker<'a> {
     /// A checker for the suites of a script.
     pub fn new(ConfiguredScript { config, script }: &'a ConfiguredScript) -> Self {
         let (assets, sensor_assets) = (AssetCache::approximate(), SensorAssets::default());
-        Self { config, script, scenes: ScenePool::new(script), assets, sensor_assets }
+        let (settled_assets, settled) = (AssetCache::default(), Mutex::default());
+        Self {
+            config,
+            script,
+            scenes: ScenePool::new(script),
+            assets,
+            settled_assets,
+            settled,
+            sensor_assets,
+        }
     }
 
-    /// Builds and checks the scenes of the first episodes of every task on all processors, gives their warnings to
-    /// `warn`, and reads the limits of their objects. Nothing is rendered; a scene settles only if its goal may hold at
-    /// the start.
+    /// Builds and checks the scenes of the first episodes of every task on all processors, lets the objects settle,
+    /// each asset once, gives their warnings to `warn`, and reads the limits of their objects. Nothing is rendered.
     ///
     /// # Errors
-    /// A setting, a scene, a sensor or a calibration file that is not valid; a request to stop.
+    /// A setting, a scene, a sensor or a calibration file that is not valid; an object that does not come to rest; a
+    /// request to stop.
     pub fn check(&self, suite: &Suite, episodes: u32, mut warn: impl FnMut(String)) -> Result<(), RunError> {
         self.config.observer.work(&format!("checking {}", suite.name));
         let tasks: Vec<&Task> = suite.tasks.iter().collect();
@@ -56,6 +74,7 @@ impl<'a> SuiteChecker<'a> {
         let jobs = EpisodeList::of_tasks(&tasks, episodes, None);
         let mut found = check_scenes(&run, &self.scenes, &jobs)?;
         found.warnings.extend(changing_defaults(&run, &self.scenes, &jobs)?);
+        found.warnings.extend(self.settle(&run, &jobs, std::mem::take(&mut found.scenes))?);
         self.config.observer.end();
         found.warnings.into_iter().for_each(&mut warn);
         let run = SuiteRun { jobs: select_episodes(self.config, suite, &tasks), ..run };
@@ -70,6 +89,54 @@ impl<'a> SuiteChecker<'a> {
     }
 }
 
+impl SuiteChecker<'_> {
+    /// Lets the objects of scenes settle whose assets have not settled before, with what supports them. Returns
+    /// warnings about those that tilt.
+    fn settle(
+        &self,
+        run: &SuiteRun,
+        jobs: &EpisodeList,
+        scenes: Vec<Scene>,
+    ) -> Result<BTreeSet<String>, RunError> {
+        let mut settled = lock(&self.settled);
+        let scenes = scenes.into_iter().map(|scene| Self::with_new_objects(scene, &mut settled));
+        let scenes: Vec<(usize, Scene)> = scenes.enumerate().filter_map(|(at, s)| Some((at, s?))).collect();
+        let settle = |index: usize| {
+            let (position, scene) = &scenes[index];
+            run.settle_scene(jobs.job(*position), scene, &self.settled_assets)
+        };
+        let mut warnings = BTreeSet::new();
+        parallel::run(scenes.len(), run.config.thread_count(), cancel::requested, settle, |_, found| {
+            warnings.extend(found);
+            Ok(())
+        })?;
+        Ok(warnings)
+    }
+
+    /// The scene without the movable objects whose assets are in `settled`, unless they may support another. Adds the
+    /// assets of those that it has. `None` if it has none.
+    fn with_new_objects(mut scene: Scene, settled: &mut BTreeSet<String>) -> Option<Scene> {
+        let is_movable = |object: &Object| matches!(object.asset.body, Body::Rigid { .. } | Body::Soft(_));
+        let box_w = |object: &Object| object.asset.shape.loose_bounds().transformed(&object.pose_w);
+        let mut kept: Vec<Aabb> = Vec::new();
+        for object in scene.objects.iter().filter(|object| is_movable(object)) {
+            if settled.insert(object.nominal.fingerprint()) {
+                kept.push(box_w(object));
+            }
+        }
+        if kept.is_empty() {
+            return None;
+        }
+        let is_kept = |own: &Aabb| {
+            let overlaps =
+                |other: &Aabb| (0..2).all(|i| own.min[i] < other.max[i] && other.min[i] < own.max[i]);
+            kept.iter().any(overlaps)
+        };
+        scene.objects.retain(|object| !is_movable(object) || is_kept(&box_w(object)));
+        Some(scene)
+    }
+}
+
 /// Warnings and assets from the scenes of a suite.
 #[derive(Default)]
 struct SceneFindings {
@@ -80,6 +147,8 @@ struct SceneFindings {
     layouts: BTreeMap<LayoutOfTask, BTreeMap<String, Vec3>>,
     /// True if shifts change a scene or a prompt.
     has_changed: bool,
+    /// The scenes, in the order of their jobs.
+    scenes: Vec<Scene>,
 }
 
 /// A layout in an episode of a task.
@@ -117,9 +186,9 @@ fn check_scenes(run: &SuiteRun, scenes: &ScenePool, jobs: &EpisodeList) -> Resul
         });
         let without_strain = soft.filter(|(material, _)| material.stable_strain().is_none());
         let without_strain = without_strain.map(|(_, name)| name.clone()).collect();
-        let of_scene = run.check_scene(task, episode, setup.scene, setup.predicates)?;
+        let of_scene = run.check_scene(task, episode, setup.scene.clone(), setup.predicates)?;
         warnings.extend(of_scene.into_iter().map(of_task));
-        Ok(SceneFindings { warnings, without_strain, layouts, has_changed })
+        Ok(SceneFindings { warnings, without_strain, layouts, has_changed, scenes: vec![setup.scene] })
     };
     let check = |position: usize| {
         let job = jobs.job(position);
@@ -128,11 +197,12 @@ fn check_scenes(run: &SuiteRun, scenes: &ScenePool, jobs: &EpisodeList) -> Resul
             episode => error.within(&format!("task {} episode {episode}", job.task.id)),
         })
     };
-    parallel::run(jobs.len(), run.config.thread_count(), cancel::requested, check, |_, found| {
+    parallel::run_in_order(jobs.len(), run.config.thread_count(), cancel::requested, check, |_, found| {
         all.warnings.extend(found.warnings);
         all.without_strain.extend(found.without_strain);
         all.has_changed |= found.has_changed;
         all.layouts.extend(found.layouts);
+        all.scenes.extend(found.scenes);
         Ok(())
     })?;
     all.warnings.extend(layout_conflicts(&all.layouts));

@@ -36,6 +36,10 @@ use softvt_script::{EpisodeSetup, LoadedScript, SceneChanges};
 /// Episodes per task whose scenes are built before a run, to find all assets and the limits that are missing.
 const MAX_SCANNED_EPISODES: usize = 100;
 
+/// Tilt while settling that is told, and that of an object that has fallen over, degrees.
+const MAX_TILT_DEG: f64 = 5.0;
+const FALLEN_DEG: f64 = 45.0;
+
 /// A suite with everything that its episodes need: [`SuiteRun::run_episode`] runs single episodes.
 ///
 /// [`SuiteRun::prepare`] checks the scenes and reads the limits. A [`Runner`](super::Runner) does that and runs all
@@ -565,6 +569,35 @@ impl<'a> SuiteRun<'a> {
             Ok(cost_warning(&sim.world).into_iter().chain(held_step).collect())
         };
         check().map_err(|error| self.episode_error(&error))
+    }
+
+    /// Lets a scene settle. Returns warnings about objects that tilt by more than [`MAX_TILT_DEG`].
+    ///
+    /// # Errors
+    /// The scene does not come to rest.
+    pub fn settle_scene(
+        &self,
+        EpisodeJob { task, episode }: EpisodeJob,
+        scene: &Scene,
+        assets: &AssetCache,
+    ) -> Result<Vec<String>, RunError> {
+        let Settings { physics, robot, .. } = &self.settings;
+        let settle = || -> Result<Simulation, EpisodeError> {
+            let mut sim = Simulation::new(Arc::new(scene.clone()), physics, robot, assets)?;
+            let layout = task.layout.clone();
+            sim.settle().map_err(|source| EpisodeError::Settle { layout, episode, source })?;
+            Ok(sim)
+        };
+        let sim = settle().map_err(|error| self.episode_error(&error))?;
+        let free = sim.objects.iter().filter(|object| object.body.is_free());
+        let tilts = free.map(|object| (&object.name, sim.tilt(object).to_degrees()));
+        let warning = |(name, tilt): (&String, f64)| {
+            let verb = if tilt > FALLEN_DEG { "falls over, by" } else { "tilts by" };
+            format!(
+                "object {name}: it {verb} {tilt:.0}° while it settles; if that is not meant, place it as it lies then"
+            )
+        };
+        Ok(tilts.filter(|(_, tilt)| *tilt > MAX_TILT_DEG).map(warning).collect())
     }
 
     /// Checks that the scene has the cameras that the file of the policy declares.

@@ -26,8 +26,8 @@ pub(crate) struct CheckArgs {
     episodes: u32,
 }
 
-/// Loads a script and builds the scenes of the first episodes of every task. Nothing is run or rendered; a scene
-/// settles only if its goal may hold at the start.
+/// Loads a script, builds the scenes of the first episodes of every task and lets their objects settle. Nothing is run
+/// or rendered.
 ///
 /// # Errors
 /// The first thing that is not valid.
