@@ -133,7 +133,7 @@
 ---@field camera_rotation number Largest rotation of these cameras about each of their axes. Expects radians in 0..1.
 ---@field hidden? softvt.Hidden Properties of the soft objects that do not show.
 
----Ranges of properties that do not show, drawn log-uniform for each soft object. Size, colour and looks do not depend on them. An instance is drawn again until the ratio of its largest to its smallest safe grip force is within window_ratio; objects need a calibration for that. Policies never see these numbers; records have them.
+---Ranges of properties that do not show, drawn log-uniform for each soft object. Size, colour and looks do not depend on them. An instance is drawn again until the ratio of its largest to its smallest safe grip force is within window_ratio by the draw reference of the asset, which its first calibration writes and later ones keep. Policies never see these numbers; records have them, with the ratio by the present calibration.
 ---@class softvt.Hidden
 ---@field aeration number[] Relative density of the foam: a factor on the density, and by its square on Young's modulus. Expects a list of 2 numbers in 0.1..10.
 ---@field staling number[] Age: a factor on Young's modulus; the collapse and damage strains shrink by its power 0.7, and τ of the instance with them. Expects a list of 2 numbers in 0.1..10.
@@ -1875,6 +1875,12 @@ function softvt.envelope(spec) end
 ---@param asset string
 ---@return softvt.Envelope?
 function softvt.calibration(asset) end
+
+---Returns the content of assets/draws/<asset>.json, the draw reference of an asset, from the JSON text of a calibration. Nil if the asset has such a file, which no calibration replaces, and without a window.
+---@param asset softvt.Asset
+---@param calibration string
+---@return string?
+function softvt.draw_reference(asset, calibration) end
 
 ---Returns the safe window of an instance of a calibrated asset; nil without a window. Experts see the factors as fields of their objects.
 ---@param spec softvt.Instance

@@ -18,6 +18,9 @@
 --
 -- Writes assets/calibration/<asset>.json, the rows of the sweep, the plot and the text of the envelope. If all standard
 -- assets are calibrated, it also writes docs/calibration.md. scripts/check_calibration.lua checks the results.
+--
+-- Writes assets/draws/<asset>.json, by which hidden instances are drawn, for an asset that has none: the first
+-- calibration makes an asset drawable, and later ones change no draw.
 local asset_names = require "asset_names"
 local calibration_page = require "calibration_page"
 local hand = require "calibration.hand"
@@ -267,6 +270,7 @@ local function finish(rows, o)
       local at = "assets/calibration/" .. name
       files[at .. ".json"], files[at .. ".sweep.jsonl"], files[at .. ".svg"], files[at .. ".txt"] =
         one.json, one.sweep, one.plot, one.text
+      files["assets/draws/" .. name .. ".json"] = softvt.draw_reference(assets[name], one.json)
       found[name] = one
       if not one.window.extent_mm then problems[#problems + 1] = problem_of(one, tilted(rows, name)) end
     end

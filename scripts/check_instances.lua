@@ -1,7 +1,6 @@
 -- Checks the limits and safe windows of instances. Presses a sample of the instances that the hidden variation draws,
 -- and compares τ of the press with the one that their episodes are judged by. Then carries them with the robot's hand,
--- and compares the forces of the loosest and the tightest safe grip with the ends of the window by which they were
--- selected.
+-- and compares the forces of the loosest and the tightest safe grip with the ends of their windows by the calibration.
 --
 --   softvt scripts/check_instances.lua                          every kind of the hidden suites
 --   softvt scripts/check_instances.lua --asset cube --count 20
@@ -33,13 +32,12 @@ local PAGE = [[
 The objects of the hidden suites differ from their assets in size, stiffness, density and stable strain, so each has a limit τ of its own. It is read
 off the presses that the calibration stores (`src/evaluation/instance.rs`). `softvt scripts/check_instances.lua` draws instances as
 the suites do, presses each in the simulation, and compares τ of that press with the one that episodes are judged by. An instance is kept if the
-ratio of its largest to its smallest safe grip force is within the `window_ratio` of `scripts/variations/hidden.lua`; the share of the draws
-that is kept is that of %d instances, and %d instances of each asset are pressed.
+ratio of its largest to its smallest safe grip force, by the draw reference ([touch.md](touch.md#what-is-drawn)), is within the `window_ratio`
+of `scripts/variations/hidden.lua`; the share of the draws that is kept is that of %d instances, and %d instances of each asset are pressed.
 
 The same instances are then carried by the robot's hand, with the grasp and the motion of the expert, and the grip force per pad is bisected.
 The loose end is the least force that carries the object with at most 2 mm of slip, the tight end the largest with which D stays within
-τ. The last columns have both over those of the window by which the instance was selected: the median, and the smallest and the
-largest.
+τ. The last columns have both over those of the window by the calibration: the median, the smallest and the largest.
 
 ]]
 

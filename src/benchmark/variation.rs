@@ -65,7 +65,7 @@ pub struct HiddenRanges {
     pub filling: FactorRange,
     /// Static friction of every pair with the object.
     pub coating: FactorRange,
-    /// Kept instances: largest over smallest safe grip force.
+    /// Kept instances: largest over smallest safe grip force, by the draw reference of the asset.
     pub window_ratio: FactorRange,
 }
 
@@ -75,10 +75,10 @@ pub enum VariationError {
     /// The scene has no object that the variation changes.
     #[error("has no soft object")]
     NoSoftObject,
-    /// The asset has no calibrated window for the condition on it.
+    /// The asset has no calibration, or none has written its draw reference.
     #[error(
-        "asset {asset} has no calibrated window, by which the variation {variation:?} selects instances; \
-         calibrate it: softvt scripts/calibrate.lua --asset {asset}"
+        "asset {asset} has no calibrated window or no draw reference (assets/draws/{asset}.json), by which the variation \
+         {variation:?} selects instances; calibrate it: softvt scripts/calibrate.lua --asset {asset}"
     )]
     NoWindow {
         /// Name of the asset.
@@ -113,8 +113,17 @@ pub enum VariationError {
     },
 }
 
-/// The calibrated instances of an asset, if it is calibrated. Only variations with hidden properties ask.
-pub type InstancePressLookup<'a> = dyn Fn(&Asset) -> Option<Arc<InstancePresses>> + 'a;
+/// Presses of an asset from which its instances are drawn.
+#[derive(Clone)]
+pub struct DrawPresses {
+    /// Those of its draw reference, by which instances are kept.
+    pub reference: Arc<InstancePresses>,
+    /// Those of its calibration, by which the windows of instances are stated.
+    pub calibrated: Arc<InstancePresses>,
+}
+
+/// The presses of an asset, if it has both. Only variations with hidden properties ask.
+pub type DrawPressLookup<'a> = dyn Fn(&Asset) -> Option<DrawPresses> + 'a;
 
 /// Ranges from which the objects, the light and the cameras of an episode are drawn.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -166,7 +175,8 @@ impl VariationRanges {
     /// which are drawn from that of the material. Soft objects are drawn in the order of the scene.
     ///
     /// With hidden properties, everything but size, colour and looks is drawn again until the window of the instance is
-    /// within `window_ratio`, so that neither size nor colour depends on what is hidden.
+    /// within `window_ratio`, so that neither size nor colour depends on what is hidden. That window is by the draw
+    /// reference of the asset: the calibration states a window and decides nothing.
     ///
     /// # Errors
     /// The scene has no soft object, or no instance can be kept.
@@ -174,7 +184,7 @@ impl VariationRanges {
         &self,
         seed: &EpisodeSeed,
         scene: &Scene,
-        presses_of: &InstancePressLookup<'_>,
+        presses_of: &DrawPressLookup<'_>,
     ) -> Result<SceneVariation, VariationError> {
         let mut streams = InstanceStreams::of(seed);
         let [mut colour, mut light, mut camera] =
@@ -213,7 +223,7 @@ impl VariationRanges {
         suite: &str,
         asset: &Asset,
         count: u32,
-        presses_of: &InstancePressLookup<'_>,
+        presses_of: &DrawPressLookup<'_>,
     ) -> Result<Vec<ObjectVariation>, VariationError> {
         let id = EpisodeId {
             suite: suite.into(),
@@ -233,7 +243,7 @@ impl VariationRanges {
         streams: &mut InstanceStreams,
         asset: &Asset,
         layout: &InstanceFactors,
-        presses_of: &InstancePressLookup<'_>,
+        presses_of: &DrawPressLookup<'_>,
     ) -> Result<ObjectVariation, VariationError> {
         let scale = self.size.uniform(&mut streams.size);
         let mut draw_material = || ObjectVariation {
@@ -250,7 +260,7 @@ impl VariationRanges {
             let (asset, variation) = names();
             VariationError::NoWindow { asset, variation }
         };
-        let presses = presses_of(asset).ok_or_else(no_window)?;
+        let DrawPresses { reference, calibrated } = presses_of(asset).ok_or_else(no_window)?;
         for draws in 1..=MAX_DRAWS {
             let material = draw_material();
             let (drawn, mut hidden) = ranges.draw(&mut streams.hidden, material);
@@ -265,9 +275,10 @@ impl VariationRanges {
                 strain: hidden.strain_factor,
                 friction: hidden.coating / PadSpec::default().static_mu,
             };
-            let window = presses.window(&factors).ok_or_else(no_window)?;
+            let window = reference.window(&factors).ok_or_else(no_window)?;
             if window.carried <= MAX_CARRIED && ranges.window_ratio.contains(window.ratio()) {
-                (hidden.window_ratio, hidden.draws) = (window.ratio(), draws);
+                let stated = calibrated.window(&factors).map_or(1.0, |window| window.ratio());
+                (hidden.window_ratio, hidden.draws) = (stated, draws);
                 return Ok(ObjectVariation { hidden: Some(hidden), ..drawn });
             }
         }

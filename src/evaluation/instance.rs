@@ -105,6 +105,8 @@ enum Quantity {
 }
 
 /// One press in such quantities, by decreasing width.
+#[derive(Debug, PartialEq, Serialize, Deserialize)]
+#[serde(transparent)]
 struct Curve {
     rows: Vec<VariantSweepRow>,
 }
@@ -138,6 +140,7 @@ impl Curve {
 }
 
 /// The presses of an asset, for the readings of its instances.
+#[derive(Debug, PartialEq, Serialize, Deserialize)]
 pub struct InstancePresses {
     /// Limit of the asset.
     limit: Option<DeformationLimit>,
@@ -261,6 +264,16 @@ impl InstancePresses {
         let by_stiffness = change(&self.stiffnesses, factors.youngs, f64::ln)?;
         Some(nominal * by_size * by_stiffness)
     }
+}
+
+/// The presses by which instances of an asset are drawn: those of its first calibration. Later ones do not change them,
+/// so that a seed gives the same instances whatever the solver and the mesh.
+#[derive(Debug, PartialEq, Serialize, Deserialize)]
+pub struct DrawReference {
+    /// Fingerprint of the asset without its mesh.
+    pub object: String,
+    /// Its presses.
+    pub presses: InstancePresses,
 }
 
 /// Value at `x` between points by increasing x; that of the nearest end beyond them.

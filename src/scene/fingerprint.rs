@@ -64,6 +64,15 @@ impl Asset {
         write_canonical(&serde_json::to_value(mechanics).unwrap_or_default(), &mut text);
         hex(&Sha256::digest(text)[..8])
     }
+
+    /// The same hash without the discretisation of a soft body: equal for all meshes of one object.
+    pub fn object_fingerprint(&self) -> String {
+        let mut object = self.clone();
+        if let Body::Soft(material) = &mut object.body {
+            (material.resolution, material.grasp_spacing) = (0, 0.0);
+        }
+        object.fingerprint()
+    }
 }
 
 /// Writes JSON with sorted keys, without spaces, and with seven significant digits of numbers that are not integers.
@@ -150,6 +159,13 @@ mod tests {
         };
         assert!(elastic(2.1e4, 0.4, 300.0) && elastic(2e4, 0.3, 300.0) && elastic(2e4, 0.4, 301.0));
         assert!(soft(&|m| m.resolution = 7));
+        let object = |resolution, poisson| {
+            let elastic = ElasticMaterial::new(2e4, poisson, 300.0).expect("valid");
+            let Body::Soft(material) = bun().body else { unreachable!() };
+            let body = Body::Soft(SoftMaterial { elastic, resolution, grasp_spacing: 1e-3, ..material });
+            Asset { body, ..bun() }.object_fingerprint()
+        };
+        assert!(object(6, 0.4) == object(7, 0.4) && object(6, 0.4) != object(6, 0.3));
         assert!(soft(&|m| m.collapse_strain = None) && soft(&|m| m.damage_strain = Some(0.1)));
         assert!(!changed(&|a| a.name = "roll".into()));
         assert!(!changed(&|a| a.visuals.clear()));

@@ -68,7 +68,7 @@ pub struct HiddenProperties {
     pub filling: f64,
     /// Static friction of every pair with the object.
     pub coating: f64,
-    /// Largest over smallest safe grip force.
+    /// Largest over smallest safe grip force, by the calibration of the asset; 1 where no grip is safe.
     pub window_ratio: f64,
     /// Number of draws until this one was kept.
     pub draws: u32,

@@ -1,6 +1,6 @@
 //! The press test of `scripts/calibrate.lua` on objects of the user.
 
-use crate::support::{Project, Run};
+use crate::support::{Project, Run, files};
 
 /// Options of a press that is as short as possible.
 const SHORT: &str = "--step-mm=1 --within-mm=0.5";
@@ -208,6 +208,54 @@ fn a_calibration_is_checked_for_the_object_that_was_calibrated() {
         message.contains("brick has no calibrated window, or one of another shape, material"),
         "{message}"
     );
+}
+
+#[test]
+fn the_calibration_of_a_finer_mesh_changes_no_draw() {
+    let project = brick("collapse_strain = 0.12");
+    let suite = r#"
+local brick = require "assets.brick"
+local floor = softvt.asset { name = "floor", shape = softvt.shape.box { size = { 1, 1, 0.05 } }:translate(0, 0, -0.025), body = softvt.static {} }
+local layout = softvt.layout("one", function(scene)
+  scene:add { name = "floor", asset = floor, position = { 0, 0, 0 } }
+  scene:add { name = "brick", asset = brick, at = { 0, 0.1 } }
+end)
+return softvt.suite { name = "one", object_type = "deformable", tasks_differ_in = "spatial", episodes = 4, tasks = { softvt.task {
+  prompt = "wait", layout = layout, goal = softvt.on { object = "brick", target = "floor" }, budget_steps = 1 } },
+  vary = softvt.variation { name = "test", size = { 0.9, 1.1 }, stiffness = { 1, 1 }, density = { 1, 1 }, friction = { 1, 1 },
+    colour = 0, light = { 1, 1 }, camera_offset = 0, camera_rotation = 0, hidden = { aeration = { 0.5, 2.5 }, staling = { 1, 6 },
+    filling = { 1, 4 }, coating = { 0.2, 1.5 }, window_ratio = { 1.2, 3 } } } }"#;
+    project.write("x.lua", suite.as_bytes());
+    let reference = "assets/draws/brick.json";
+    let calibrate = |out: &str| {
+        quick(&project, out).rows();
+        for (path, bytes) in files(&project.path(&format!("{out}/assets"))) {
+            project.write(&format!("assets/{path}"), &bytes);
+        }
+        project.path(&format!("{out}/{reference}")).exists()
+    };
+    let drawn = |out: &str| -> (Vec<_>, Vec<f64>) {
+        let records = project.run("x.lua").policy("noop").out(out).records();
+        let of_run = records.into_iter().map(|record| {
+            let mut one = record.header.variation.expect("varied").objects["brick"];
+            let hidden = one.hidden.as_mut().expect("hidden");
+            let ratio = std::mem::replace(&mut hidden.window_ratio, 0.0);
+            (one, ratio)
+        });
+        of_run.unzip()
+    };
+    assert!(calibrate("first"), "a reference of the first calibration");
+    let (instances, ratios) = drawn("coarse");
+    assert!(project.json("coarse/run.json")["sources"].to_string().contains(reference));
+    let finer = project.text("assets/brick.lua").replace("resolution = 4", "resolution = 5");
+    project.write("assets/brick.lua", finer.as_bytes());
+    assert!(!calibrate("second"), "the reference of the first stays");
+    let (again, other_ratios) = drawn("fine");
+    assert_eq!(again, instances);
+    assert_ne!(other_ratios, ratios);
+    std::fs::remove_file(project.path(reference)).expect("removed");
+    let message = project.run("x.lua").policy("noop").error();
+    assert!(message.contains("no draw reference (assets/draws/brick.json)"), "{message}");
 }
 
 #[test]

@@ -24,14 +24,14 @@ use crate::{
         privilege::check_privilege,
     },
 };
-use softvt_benchmark::variation::{InstancePressLookup, VariationError, VariationRanges};
+use softvt_benchmark::variation::{DrawPressLookup, DrawPresses, VariationError, VariationRanges};
 use softvt_common::parallel::lock;
 use softvt_evaluation::{
     calibration::{
         CalibrationMeasurements, Envelope, HoldRow, SafeWindow, SweepProtocol, SweepRow, WindowEnd, force_at,
     },
     envelope_text::summary_text,
-    instance::{GripAtRest, InstanceFactors, InstancePresses, InstanceWindow, VariantSweep},
+    instance::{DrawReference, GripAtRest, InstanceFactors, InstancePresses, InstanceWindow, VariantSweep},
     safety::DeformationLimit,
     thresholds::{ThresholdFile, sweep_jsonl},
 };
@@ -67,36 +67,63 @@ pub(crate) fn calibrated_asset(lua: &Lua, asset: &str) -> mlua::Result<Option<Ca
         return Ok(known.clone());
     }
     let found = calibration_file(lua, "softvt.grip_window", asset)?.and_then(|(_, file)| {
-        let presses = Arc::new(InstancePresses::new(file.envelopes.get(asset)?, file.calibration.kappa));
+        let presses = Arc::new(presses_of(&file, asset)?);
         Some(CalibratedAsset { presses, fingerprint: file.fingerprints.get(asset).cloned() })
     });
     lock(&assets.0).insert(asset.to_owned(), found.clone());
     Ok(found)
 }
 
-/// Calls `draw` with the calibrated instances of assets.
+fn presses_of(file: &ThresholdFile, asset: &str) -> Option<InstancePresses> {
+    Some(InstancePresses::new(file.envelopes.get(asset)?, file.calibration.kappa))
+}
+
+fn reference_path(asset: &str) -> String {
+    format!("assets/draws/{asset}.json")
+}
+
+/// The presses by which instances of an asset are drawn; `None` without a file of them for this object.
+fn draw_reference(lua: &Lua, asset: &Asset) -> mlua::Result<Option<InstancePresses>> {
+    let wrong = |error: String| fail(lua, format!("asset {:?}: {error}", asset.name));
+    let library = app_data::<SharedLibrary>(lua)?;
+    let found = lock(&library).optional_data(&reference_path(&asset.name));
+    let Some(FoundFile { name, bytes }) = found.map_err(|error| wrong(error.to_string()))? else {
+        return Ok(None);
+    };
+    let file: DrawReference = serde_json::from_slice(&bytes)
+        .map_err(|error| wrong(format!("{name}: not a draw reference: {error}; remove it and calibrate")))?;
+    Ok((file.object == asset.object_fingerprint()).then_some(file.presses))
+}
+
+/// Calls `draw` with the presses of assets.
 ///
 /// # Errors
-/// A calibration cannot be read. The inner error is that of `draw`.
+/// A calibration or a draw reference cannot be read. The inner error is that of `draw`.
 pub(crate) fn draw<T>(
     lua: &Lua,
-    draw: impl FnOnce(&InstancePressLookup<'_>) -> Result<T, VariationError>,
+    draw: impl FnOnce(&DrawPressLookup<'_>) -> Result<T, VariationError>,
 ) -> mlua::Result<Result<T, VariationError>> {
     let broken = RefCell::new(None);
     // A fingerprint takes milliseconds, and a sample asks for one asset many times.
-    let known = RefCell::new(BTreeMap::<*const Asset, Option<Arc<InstancePresses>>>::new());
-    let find = |asset: &Asset| match calibrated_asset(lua, &asset.name) {
+    let known = RefCell::new(BTreeMap::<*const Asset, Option<DrawPresses>>::new());
+    let find = |asset: &Asset| -> mlua::Result<Option<DrawPresses>> {
         // A calibration of another version of the asset does not count, as for its limit.
-        Ok(found) => found
-            .filter(|found| found.fingerprint.as_ref().is_none_or(|known| *known == asset.fingerprint()))
-            .map(|found| found.presses),
-        Err(error) => {
-            broken.replace(Some(error));
-            None
-        }
+        let fits = |found: &CalibratedAsset| {
+            found.fingerprint.as_ref().is_none_or(|known| *known == asset.fingerprint())
+        };
+        let Some(found) = calibrated_asset(lua, &asset.name)?.filter(fits) else { return Ok(None) };
+        let presses = |reference| DrawPresses { reference: Arc::new(reference), calibrated: found.presses };
+        Ok(draw_reference(lua, asset)?.map(presses))
     };
     let drawn = draw(&|asset| {
-        known.borrow_mut().entry(std::ptr::from_ref(asset)).or_insert_with(|| find(asset)).clone()
+        let found = || match find(asset) {
+            Ok(found) => found,
+            Err(error) => {
+                broken.replace(Some(error));
+                None
+            }
+        };
+        known.borrow_mut().entry(std::ptr::from_ref(asset)).or_insert_with(found).clone()
     });
     match broken.into_inner() {
         Some(error) => Err(error),
@@ -170,14 +197,17 @@ fn calibration_path(asset: &str) -> String {
     format!("assets/calibration/{asset}.json")
 }
 
-/// Finds the calibration of an asset, so that the episodes of the script have it. An asset that is made during an
-/// episode has none unless it was found before.
+/// Finds the calibration and the draw reference of an asset, so that the episodes of the script have them. An asset
+/// that is made during an episode has none unless they were found before.
 pub(crate) fn find_calibration(lua: &Lua, asset: &str) -> mlua::Result<()> {
     let library = app_data::<SharedLibrary>(lua)?;
-    match lock(&library).optional_data(&calibration_path(asset)) {
-        Ok(_) | Err(LibraryError::LateFile { .. }) => Ok(()),
-        Err(error) => Err(fail(lua, format!("asset {asset:?}: {error}"))),
+    for path in [calibration_path(asset), reference_path(asset)] {
+        match lock(&library).optional_data(&path) {
+            Ok(_) | Err(LibraryError::LateFile { .. }) => {}
+            Err(error) => return Err(fail(lua, format!("asset {asset:?}: {error}"))),
+        }
     }
+    Ok(())
 }
 
 /// Reads assets/calibration/<asset>.json; returns its path as messages show it and its content.
@@ -345,6 +375,21 @@ functions! {
                     };
                     Some(envelope_table(lua, &asset, envelope, &file)?)
                 }
+            }
+        }
+        /// Returns the content of assets/draws/<asset>.json, the draw reference of an asset, from the JSON text of a
+        /// calibration. Nil if the asset has such a file, which no calibration replaces, and without a window.
+        fn draw_reference(lua, asset: Constructed<AssetSpec>, calibration: Unchecked = Type::Text) -> ["string?"] {
+            let (label, asset) = ("softvt.draw_reference", asset.asset(lua)?);
+            let text: String = deserialize(lua, label, &calibration.0)?;
+            let file = ThresholdFile::parse(&text, "calibration").map_err(|e| fail(lua, format!("{label}: {e}")))?;
+            let of_calibration = presses_of(&file, &asset.name).filter(|found| found.window(&InstanceFactors::NOMINAL).is_some());
+            match (draw_reference(lua, &asset)?, of_calibration) {
+                (None, Some(presses)) => {
+                    let reference = DrawReference { object: asset.object_fingerprint(), presses };
+                    Some(serde_json::to_string(&reference).map_err(mlua::Error::external)? + "\n")
+                }
+                _ => None,
             }
         }
         /// Returns the safe window of an instance of a calibrated asset; nil without a window. Experts see the factors

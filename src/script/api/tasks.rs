@@ -111,7 +111,8 @@ record! {
     }
     /// Ranges of properties that do not show, drawn log-uniform for each soft object. Size, colour and looks do not
     /// depend on them. An instance is drawn again until the ratio of its largest to its smallest safe grip force is
-    /// within window_ratio; objects need a calibration for that. Policies never see these numbers; records have them.
+    /// within window_ratio by the draw reference of the asset, which its first calibration writes and later ones keep.
+    /// Policies never see these numbers; records have them, with the ratio by the present calibration.
     HiddenSpec: "softvt.Hidden" as "variation.hidden" {
         /// Relative density of the foam: a factor on the density, and by its square on Young's modulus.
         aeration: [f64; 2] = FACTORS;

@@ -62,6 +62,22 @@ fn a_calibration_is_read_when_the_plan_is_made_and_no_later() {
 }
 
 #[test]
+fn a_draw_reference_is_made_once_for_an_object_with_a_window() {
+    let text = message_of(
+        "local function ball(youngs, resolution)
+          return softvt.asset { name = 'sphere', shape = require('assets.sphere').shape, body = softvt.soft {
+            youngs_pa = youngs, poisson = 0.3, density = 300, resolution = resolution } }
+        end
+        local function made(asset, text) return softvt.draw_reference(asset, text) and 'made' or 'none' end
+        local sphere, text = require 'assets.sphere', softvt.calibration 'sphere'.json
+        local soft, fine = softvt.draw_reference(ball(5e3, 6), text), softvt.draw_reference(ball(5e3, 7), text)
+        local held = text:gsub('\"width_lower_mm\": [%d.]+', '\"width_lower_mm\": null'):gsub('\"held\": 1', '\"held\": 0')
+        error(('%s %s %s'):format(made(sphere, text), soft == fine and made(ball(5e3, 6), text), made(ball(5e3, 6), held)), 0)",
+    );
+    assert_eq!(text, "none made none");
+}
+
+#[test]
 fn points_may_read_files_that_later_machines_then_hold() {
     let script = "return softvt.experiment { name = 'e',\n\
         points = function() return { { a = require('lib').value } } end,\n\

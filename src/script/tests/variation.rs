@@ -4,7 +4,7 @@ use super::*;
 use crate::{EpisodeSetup, SceneChanges, load_variation};
 use softvt_benchmark::Plan;
 use softvt_common::episode_id::{EpisodeId, EpisodeSplit};
-use softvt_scene::Object;
+use softvt_scene::{HiddenProperties, Object};
 
 const ASSETS: &str = r#"
 local mat = softvt.asset { name = "mat", shape = softvt.shape.box { size = { 0.2, 0.2, 0.01 } }:grounded(), body = softvt.static {} }
@@ -332,4 +332,48 @@ fn ranges_that_leave_no_instance_are_refused_with_the_remedy() {
             && message.contains("softvt scripts/calibrate.lua --asset ball"),
         "{message}"
     );
+}
+
+/// What does not show of each object of an episode, in the order of names.
+fn hidden_of(setup: EpisodeSetup) -> Vec<HiddenProperties> {
+    let objects = setup.variation.expect("varied").objects;
+    objects.into_values().map(|drawn| drawn.hidden.expect("hidden")).collect()
+}
+
+#[test]
+fn another_calibration_changes_the_stated_windows_and_no_draw() {
+    let project = project(&format!("{HIDDEN} return suite(placed(sphere), softvt.variation(ranges))"));
+    let drawn = || -> Vec<HiddenProperties> {
+        let loaded = project.load("x.lua", &[]).expect("a suite");
+        (0..5).flat_map(|episode| hidden_of(open(&loaded, 0, episode).expect("an episode"))).collect()
+    };
+    let before = drawn();
+    let path = "assets/calibration/sphere.json";
+    let shipped = crate::embedded(path).expect("shipped");
+    let mut other: serde_json::Value = serde_json::from_slice(shipped).expect("JSON");
+    // A press with 1.3 times the force gives windows with 1.3 times the ratio.
+    for variant in other["envelopes"]["sphere"]["variants"].as_array_mut().expect("presses") {
+        for row in variant["rows"].as_array_mut().expect("rows") {
+            row["force_n"] = (1.3 * row["force_n"].as_f64().expect("a force")).into();
+        }
+    }
+    project.write(path, other.to_string().as_bytes());
+    for (before, after) in before.into_iter().zip(drawn()) {
+        assert!((after.window_ratio / before.window_ratio - 1.3).abs() < 1e-9, "{before:?} {after:?}");
+        assert_eq!(HiddenProperties { window_ratio: before.window_ratio, ..after }, before);
+    }
+}
+
+#[test]
+fn instances_without_a_safe_grip_by_the_calibration_are_drawn() {
+    let project = project(&format!("{HIDDEN} return suite(placed(sphere), softvt.variation(ranges))"));
+    let path = "assets/calibration/sphere.json";
+    let text = std::str::from_utf8(crate::embedded(path).expect("shipped")).expect("UTF-8");
+    let mut none: serde_json::Value = serde_json::from_str(text).expect("JSON");
+    none["envelopes"]["sphere"]["holds"] = serde_json::json!([]);
+    none["envelopes"]["sphere"]["window"]["width_lower_mm"] = serde_json::Value::Null;
+    project.write(path, none.to_string().as_bytes());
+    let loaded = project.load("x.lua", &[]).expect("a suite");
+    let drawn = hidden_of(open(&loaded, 0, 0).expect("an episode"));
+    assert!(drawn.iter().all(|hidden| hidden.window_ratio == 1.0), "{drawn:?}");
 }
