@@ -377,3 +377,51 @@ fn instances_without_a_safe_grip_by_the_calibration_are_drawn() {
     let drawn = hidden_of(open(&loaded, 0, 0).expect("an episode"));
     assert!(drawn.iter().all(|hidden| hidden.window_ratio == 1.0), "{drawn:?}");
 }
+
+#[test]
+fn the_hidden_suites_draw_the_published_instances() {
+    let drawn = |suite: &str| -> Vec<String> {
+        let project = Project::new(&[("x.lua", &format!("return require 'suites.{suite}'"))]);
+        let limits = VmLimits { load: Duration::from_secs(10), ..limits() };
+        let loaded = project.load_with("x.lua", &[], &limits).unwrap_or_else(|error| panic!("{error}"));
+        let line = |task: usize| {
+            let id = EpisodeId { suite: suite.to_owned(), task, ..episode_id(0, 0) };
+            let setup = EpisodeSetup::open(&loaded, &id, &SceneChanges::default()).expect("an episode");
+            let properties = hidden_of(setup).into_iter().map(|one| {
+                let HiddenProperties { aeration, staling, filling, coating, draws, .. } = one;
+                format!("{aeration:.3} {staling:.3} {filling:.3} {coating:.3} {draws}")
+            });
+            properties.collect::<Vec<_>>().join(", ")
+        };
+        (0..10).map(line).collect()
+    };
+    assert_eq!(drawn("object_hidden"), OBJECT_HIDDEN);
+    assert_eq!(drawn("spatial_hidden"), SPATIAL_HIDDEN);
+}
+
+/// Aeration, staling, filling, coating and number of draws of the soft objects of the first episode of each task. They
+/// change only if the rule of the draws does, which makes published results incomparable.
+const OBJECT_HIDDEN: [&str; 10] = [
+    "2.345 1.610 3.865 0.335 72",
+    "0.646 2.938 2.618 0.278 71",
+    "1.441 5.185 2.173 0.257 59",
+    "0.531 1.101 3.201 0.431 117",
+    "0.820 1.480 1.226 0.234 3",
+    "0.620 1.581 2.721 0.306 34",
+    "0.900 1.245 1.603 0.490 16",
+    "1.305 3.196 1.698 0.238 9",
+    "0.509 4.431 1.383 0.217 34",
+    "1.764 5.217 3.667 0.340 4",
+];
+const SPATIAL_HIDDEN: [&str; 10] = [
+    "0.618 1.766 2.454 0.313 26, 0.911 1.447 2.333 0.242 1",
+    "0.677 1.133 2.479 0.331 90, 0.687 3.042 2.853 0.315 4",
+    "2.320 1.353 3.793 0.388 10, 1.308 4.510 2.138 0.238 18",
+    "1.542 2.009 1.798 0.235 9, 1.242 1.413 1.820 0.291 18",
+    "0.598 2.068 1.872 0.217 73, 1.246 1.256 3.637 0.223 7",
+    "0.538 3.922 2.649 0.286 24, 1.021 1.815 3.534 0.241 79",
+    "0.522 1.229 2.531 0.304 111, 0.542 1.055 2.501 0.332 167",
+    "0.544 1.874 2.466 0.278 21, 0.514 5.551 3.464 0.300 18",
+    "0.661 2.041 1.296 0.268 3, 0.839 2.670 1.348 0.223 95",
+    "0.871 4.348 1.795 0.228 88, 1.476 3.282 3.172 0.286 15",
+];
