@@ -1020,6 +1020,10 @@ function Body:strain_percentile(percent) end
 ---@return number
 function Body:volume_beyond_pct(strain) end
 
+---Returns how the body lies if it has tilted by 5° or more from its modelled shape, else nil.
+---@return softvt.Lying?
+function Body:lying() end
+
 ---Returns the size of the bounding box of the nodes, m.
 ---@return number[]
 function Body:extent() end
@@ -1133,6 +1137,14 @@ local Measurements = {}
 ---@field force number[] True force on the gel, N, pad frame: the vector sum over its contact points, friction included. A pressing body makes z negative.
 ---@field depth_mm number Largest depth of the indentation, mm.
 local TactileReading = {}
+
+---The upright box, along its narrowest side, about a soft body that has tilted.
+---@class softvt.Lying
+---@field tilt number Angle between the vertical and the z axis of its shape, rad.
+---@field centre number[] Centre of the box, m.
+---@field size number[] Edge lengths of the box, longer horizontal side first, m.
+---@field yaw number Rotation of the box about the vertical, rad.
+local Lying = {}
 
 ---One end of the safe window of an asset.
 ---@class softvt.WindowEnd
@@ -1450,13 +1462,13 @@ function SceneState:clearance(pose, options) end
 ---@field name string Name in the scene.
 ---@field asset string Name of its asset.
 ---@field centre number[] Centre of its bounding box, world frame, m.
----@field size number[] Edge lengths of its bounding box at rest, m.
+---@field size number[] Edge lengths of its bounding box at rest, m: along the axes of its shape, or, if it has tilted by 5° or more while it settled, of the upright box about it as it lay then, longer horizontal side first.
 ---@field scale number Size relative to that of its asset. `size` and hints in metres are those of the object itself.
 ---@field youngs_factor number? Young's modulus relative to that of its asset; nil unless soft.
 ---@field density_factor number? Density relative to that of its asset; nil unless soft or rigid.
 ---@field strain_factor number? Stable strain relative to that of its asset; nil unless soft.
 ---@field coating number? Static friction of its coating, which is that of every pair with it; nil without one.
----@field yaw number Rotation about the vertical, rad.
+---@field yaw number Rotation of its bounding box about the vertical, rad.
 ---@field hints table<string, number> Numbers of its asset for experts; those whose names end in _m are lengths and follow the scale.
 ---@field pose softvt.Pose Frame of its shape: the origin of an object is below its centre, at its lowest point.
 ---@field joint number? Joint value of a part, m or rad; nil for a whole object, as are the next three.

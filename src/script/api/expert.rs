@@ -613,7 +613,7 @@ output! {
         strain_factor: "number?" = object.strain_factor;
         /// Static friction of its coating, which is that of every pair with it; nil without one.
         coating: "number?" = object.coating;
-        /// Rotation of that box about the vertical, rad.
+        /// Rotation of its bounding box about the vertical, rad.
         yaw: "number" = object.yaw;
         /// Numbers of its asset for experts; those whose names end in _m are lengths and follow the scale.
         hints: "table<string, number>" = lua.create_table_from(
