@@ -35,7 +35,8 @@ fn an_object_that_settles_tilted_is_gripped_as_it_lies() {
     for shape in [CONE, BERRY, EGG] {
         let project = Project::new(&[("x.lua", &placing(shape))]);
         let finished = project.run("x.lua").out("run").finish();
-        assert!(finished.result().records[0].verdict.goal, "{shape}: {}", finished.messages);
+        let messages = finished.messages.clone();
+        assert!(finished.result().records[0].verdict.goal, "{shape}: {messages}");
     }
 }
 
