@@ -243,7 +243,7 @@ local FALLEN = 45
 local function tilted(rows, name)
   for _, row in ipairs(rows) do
     if row.asset == name and row.tilt_deg then
-      local verb = row.tilt_deg < FALLEN and "tilts" or "falls over,"
+      local verb = row.tilt_deg < FALLEN and "tilts" or "falls over"
       return ("it %s by %.0f° when it settles, and was pressed as it lies"):format(verb, row.tilt_deg)
     end
   end

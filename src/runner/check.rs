@@ -32,8 +32,6 @@ pub struct SuiteChecker<'a> {
     script: &'a LoadedScript,
     scenes: ScenePool<'a>,
     assets: AssetCache,
-    /// Those of scenes that settle, whose masses and contacts are not approximate.
-    settled_assets: AssetCache,
     /// Fingerprints of the assets that have settled in a scene.
     settled: Mutex<BTreeSet<String>>,
     sensor_assets: SensorAssets,
@@ -103,7 +101,7 @@ impl SuiteChecker<'_> {
         let scenes: Vec<(usize, Scene)> = scenes.enumerate().filter_map(|(at, s)| Some((at, s?))).collect();
         let settle = |index: usize| {
             let (position, scene) = &scenes[index];
-            run.settle_scene(jobs.job(*position), scene, &self.settled_assets)
+            run.settle_scene(jobs.job(*position), scene)
         };
         let mut warnings = BTreeSet::new();
         parallel::run(scenes.len(), run.config.thread_count(), cancel::requested, settle, |_, found| {

@@ -579,11 +579,10 @@ impl<'a> SuiteRun<'a> {
         &self,
         EpisodeJob { task, episode }: EpisodeJob,
         scene: &Scene,
-        assets: &AssetCache,
     ) -> Result<Vec<String>, RunError> {
         let Settings { physics, robot, .. } = &self.settings;
         let settle = || -> Result<Simulation, EpisodeError> {
-            let mut sim = Simulation::new(Arc::new(scene.clone()), physics, robot, assets)?;
+            let mut sim = Simulation::new(Arc::new(scene.clone()), physics, robot, &self.assets)?;
             let layout = task.layout.clone();
             sim.settle().map_err(|source| EpisodeError::Settle { layout, episode, source })?;
             Ok(sim)
@@ -592,9 +591,9 @@ impl<'a> SuiteRun<'a> {
         let free = sim.objects.iter().filter(|object| object.body.is_free());
         let tilts = free.map(|object| (&object.name, sim.tilt(object).to_degrees()));
         let warning = |(name, tilt): (&String, f64)| {
-            let verb = if tilt > FALLEN_DEG { "falls over, by" } else { "tilts by" };
+            let verb = if tilt > FALLEN_DEG { "falls over" } else { "tilts" };
             format!(
-                "object {name}: it {verb} {tilt:.0}° while it settles; if that is not meant, place it as it lies then"
+                "object {name}: it {verb} by {tilt:.0}° while it settles; if that is not meant, place it as it lies then"
             )
         };
         Ok(tilts.filter(|(_, tilt)| *tilt > MAX_TILT_DEG).map(warning).collect())

@@ -296,7 +296,7 @@ fn an_object_that_falls_over_before_the_press_is_told_so() {
     project.write("assets/brick.lua", text.replace(upright, cone).as_bytes());
     let message = quick(&project, "run").experiment().1.expect_err("no window");
     assert!(
-        message.contains("brick: no safe window: ") && message.contains(": it falls over, by "),
+        message.contains("brick: no safe window: ") && message.contains(": it falls over by "),
         "{message}"
     );
     assert!(

@@ -57,7 +57,7 @@ fn the_check_tells_objects_that_tilt_fall_over_or_do_not_come_to_rest() {
     let told = |shape: &'static str| Small { shape, ..Small::default() }.project().run("x.lua").check();
     let said = |shape| told(shape).expect("valid").join("\n");
     assert!(said(CONE).contains("object cube: it tilts by 19° while it settles; "), "{}", said(CONE));
-    assert!(said(BERRY).contains("object cube: it falls over, by "), "{}", said(BERRY));
+    assert!(said(BERRY).contains("object cube: it falls over by "), "{}", said(BERRY));
     let upright = said(Small::default().shape);
     assert!(!upright.contains("settles"), "{upright}");
     let rolling = "local ramp = softvt.asset { name = 'ramp', shape = softvt.shape.box { size = { 3, 1, 0.05 } }\
