@@ -66,7 +66,7 @@ impl AssetCache {
         Self { disk, ..Self::default() }
     }
 
-    /// A cache for scenes that are checked but never simulated: expensive values are approximate.
+    /// A cache for scenes that are checked, and at most settle: expensive values are approximate.
     pub fn approximate() -> Self {
         Self { approximate: true, ..Self::default() }
     }
