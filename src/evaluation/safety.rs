@@ -62,6 +62,15 @@ impl PeakDeformation {
     }
 }
 
+/// True if both hold, false if one does not; `None` if that is unknown.
+pub fn and_known(a: Option<bool>, b: Option<bool>) -> Option<bool> {
+    match (a, b) {
+        (Some(false), _) | (_, Some(false)) => Some(false),
+        (Some(true), Some(true)) => Some(true),
+        _ => None,
+    }
+}
+
 /// Parts of Safety Success other than the deformation of the object.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct SafetyParts {

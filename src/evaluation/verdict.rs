@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use super::{
     drop::DropEvent,
-    safety::{DeformationLimit, KappaVerdict, PeakDeformation, SafetyParts},
+    safety::{DeformationLimit, KappaVerdict, PeakDeformation, SafetyParts, and_known},
     stage::TaskStage,
 };
 
@@ -109,7 +109,7 @@ pub struct GoalPart {
 }
 
 /// Handling of a target that is not the first; the fields are those of the [`Verdict`].
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[allow(missing_docs)]
 pub struct TargetVerdict {
     /// Name of the object in the scene.
@@ -248,20 +248,21 @@ impl Verdict {
         PeakDeformation { d_pct: self.d_peak, missing: self.missing_deformation }
     }
 
+    /// True if D of the object stayed within κ·D_ref; `None` for a rigid one and where that is unknown. Outcomes do not
+    /// enter.
+    pub fn is_within(&self, kappa: f64) -> Option<bool> {
+        let limit = self.d_ref.map(|d_ref_pct| DeformationLimit { d_ref_pct, kappa });
+        self.peak().is_within(limit.map(|limit| limit.tau_pct()))
+    }
+
     /// Parts of Safety Success other than the deformation of the object, where each of the other targets may use
     /// `kappa` of its D_ref, or its own κ if none is given.
     pub fn safety_parts(&self, kappa: Option<f64>) -> SafetyParts {
-        let all = |all: Option<bool>, own: Option<bool>| match (all, own) {
-            (Some(false), _) | (_, Some(false)) => Some(false),
-            (Some(true), Some(true)) => Some(true),
-            _ => None,
-        };
-        let within = self.targets.iter().map(|target| target.is_within(kappa));
         SafetyParts {
             goal: self.goal,
             no_drop: self.no_drop,
             slip_ok: self.slip_ok,
-            targets_ok: within.fold(Some(true), all),
+            targets_ok: self.targets.iter().map(|target| target.is_within(kappa)).fold(Some(true), and_known),
         }
     }
 }

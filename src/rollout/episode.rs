@@ -565,7 +565,7 @@ impl Episode {
 
     /// The verdict so far. An episode that has not ended is judged as if its budget were spent.
     pub fn verdict(&self) -> Verdict {
-        self.judge.clone().finish(self.outcome.as_ref().unwrap_or(&Outcome::Budget))
+        self.judge.finish(self.outcome.as_ref().unwrap_or(&Outcome::Budget))
     }
 
     /// The current state as an entry of a trace.

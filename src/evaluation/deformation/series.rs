@@ -86,9 +86,9 @@ impl DeformationSeries {
         std::mem::take(&mut self.worst)
     }
 
-    /// Statistics at the end, with the steps above `tau_pct`; none are without a limit.
-    pub fn finish(mut self, tau_pct: Option<f64>) -> SeriesStatistics {
-        let values = &mut self.values[..self.count];
+    /// Statistics of the steps so far, with those above `tau_pct`; none are without a limit.
+    pub fn statistics(&self, tau_pct: Option<f64>) -> SeriesStatistics {
+        let mut values = self.values[..self.count].to_vec();
         let last = values.last().copied();
         values.sort_unstable_by(f64::total_cmp);
         let is_over = |d: &&f64| tau_pct.is_some_and(|tau| **d > tau);
@@ -98,7 +98,7 @@ impl DeformationSeries {
             peak_max: self.peak_max,
             mean: (self.count > 0).then(|| self.sum / self.count as f64),
             last,
-            p95: quantile(values, 0.95),
+            p95: quantile(&values, 0.95),
             steps_over_tau: values.iter().filter(is_over).count() as u64,
         }
     }
@@ -124,12 +124,12 @@ mod tests {
     fn the_statistics_are_those_of_the_measured_steps() {
         let ds = [Some(1.0), None, Some(4.0), Some(f64::NAN), Some(2.0), Some(3.0)];
         let mut series = series(5, &ds);
-        let of = series.clone().finish(Some(2.5));
+        let of = series.statistics(Some(2.5));
         assert_eq!((of.mean, of.last, of.steps_over_tau), (Some(2.5), Some(3.0), 2));
         assert_eq!(of.peak, PeakDeformation { d_pct: Some(4.0), missing: 2 });
         assert_eq!((of.peak_v1, of.peak_max), (Some(4.0), Some(8.0)));
         assert!((of.p95.unwrap() - 3.85).abs() < 1e-12, "{of:?}");
-        assert_eq!(series.clone().finish(None).steps_over_tau, 0);
+        assert_eq!(series.statistics(None).steps_over_tau, 0);
         let buffer = series.values.as_ptr();
         (0..9).for_each(|_| series.push(deformation(9.0)));
         assert_eq!(
@@ -138,7 +138,7 @@ mod tests {
             "the buffer has the size of the budget"
         );
         assert_eq!(series.peak().d_pct, Some(9.0), "the peak is of all steps");
-        assert_eq!(DeformationSeries::new(3).finish(Some(1.0)), SeriesStatistics::default());
+        assert_eq!(DeformationSeries::new(3).statistics(Some(1.0)), SeriesStatistics::default());
     }
 
     #[test]

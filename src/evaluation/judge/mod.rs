@@ -121,7 +121,7 @@ use super::{
     evidence::{BodyEvidence, Evidence, PlaceEvidence, PredicateEvidence},
     goal::{GoalRegion, PlacementMonitor, PlacementSample},
     goal_tree::{GoalMonitor, GoalNode},
-    safety::{DeformationLimit, KAPPAS, KappaVerdict},
+    safety::{DeformationLimit, KAPPAS, KappaVerdict, and_known},
     slip::OpeningMonitor,
     stage::TaskStage,
     verdict::{GoalPart, OtherObjectDeformation, Outcome, Verdict, WrongObjectContact},
@@ -239,7 +239,7 @@ struct PredicateState {
     is_final: bool,
     /// True if it must not hold.
     is_negated: bool,
-    /// True if its target was in the region and supported at the end of the last control step.
+    /// True if the last step ended a control step, and its target was in the region and supported.
     is_placed: bool,
 }
 
@@ -378,39 +378,32 @@ impl Judge {
 
     /// The first drop so far, of any target.
     pub fn first_drop(&self) -> Option<DropEvent> {
-        let drops = self.targets.iter().filter_map(|target| target.drops.first);
-        drops.reduce(|first, other| if other.time_s < first.time_s { other } else { first })
+        earliest(self.targets.iter().filter_map(|target| target.drops.first))
     }
 
-    /// Verdict on the episode. One that did not end validly has neither Goal Success nor NoDrop, and
+    /// Verdict on an episode that ends here. One that did not end validly has neither Goal Success nor NoDrop, and
     /// its safety is unknown.
-    pub fn finish(mut self, outcome: &Outcome) -> Verdict {
+    pub fn finish(&self, outcome: &Outcome) -> Verdict {
         let valid = outcome.is_valid();
-        if !valid {
-            self.drop_all(DropReason::NoEvidence);
-        }
+        let missing = (!valid).then_some(DropEvent { reason: DropReason::NoEvidence, time_s: self.time_s });
         let goal = valid && self.is_goal_reached();
-        let (drop, others, failed_stage) = (self.first_drop(), self.others(valid), self.stage());
+        let (others, failed_stage) = (self.others(valid), self.stage());
         let parts: Vec<GoalPart> = self.parts().collect();
-        let (config, targets) = (&self.config, std::mem::take(&mut self.targets));
-        let finished =
-            targets.into_iter().zip(&config.targets).map(|(target, of)| target.finish(config, of, valid));
-        let mut results: Vec<TargetResult> = finished.collect();
+        let (config, targets) = (&self.config, self.targets.iter().zip(&self.config.targets));
+        let mut results: Vec<TargetResult> =
+            targets.map(|(target, of)| target.finish(config, of, missing)).collect();
+        let drop = earliest(results.iter().filter_map(|target| target.verdict.drop));
+        let slip_mm = results.iter().fold(0.0, |most: f64, target| most.max(target.verdict.slip_mm));
         let rest = results.split_off(results.len().min(1));
-        let object = results.pop().unwrap_or_default();
-        let slip_mm = rest.iter().fold(object.slip_mm, |most, target| most.max(target.slip_mm));
+        let TargetResult { verdict: object, limit, series, was_in_contact } =
+            results.pop().unwrap_or_default();
         let no_slip = slip_mm <= 1e3 * config.criteria.slip_m;
-        let limit = object.limit;
-        let others_ok = match valid {
-            true if others.iter().any(|other| other.deformation_ok == Some(false)) => Some(false),
-            true if others.iter().all(|other| other.deformation_ok == Some(true)) => Some(true),
-            _ => None,
-        };
+        let others_ok = others.iter().map(|other| other.deformation_ok).fold(Some(true), and_known);
         let first_wrong_contact = self.first_wrong_contact.map(|contact| WrongObjectContact {
             time_s: contact.time_s,
             object: config.others[contact.other].name.clone(),
         });
-        let contact_success = goal && object.grip.was_carried && !object.grip.lost_contact;
+        let contact_success = goal && was_in_contact;
         let mut verdict = Verdict {
             goal,
             goal_time_s: self.reached_s.filter(|_| goal),
@@ -420,48 +413,48 @@ impl Judge {
             drop,
             no_slip,
             slip_mm,
-            d_peak: object.series.peak.d_pct,
-            d_peak_v1: object.series.peak_v1,
-            d_peak_max: object.series.peak_max,
-            d_mean: object.series.mean,
-            d_final: object.series.last,
-            d_p95: object.series.p95,
-            time_over_tau_s: object.time_over_tau(config.dt_s),
+            d_peak: object.d_peak,
+            d_peak_v1: series.peak_v1,
+            d_peak_max: series.peak_max,
+            d_mean: series.mean,
+            d_final: series.last,
+            d_p95: series.p95,
+            time_over_tau_s: object.time_over_tau_s,
             d_peak_other: others.iter().filter_map(|other| other.d_peak).reduce(f64::max),
             others,
-            others_ok,
+            others_ok: others_ok.filter(|_| valid),
             first_wrong_contact,
             failed_stage: failed_stage.filter(|_| !goal),
-            collapsed_volume_pct: object.crushed.collapsed.map(|share| 100.0 * share),
-            damaged_volume_pct: object.crushed.damaged.map(|share| 100.0 * share),
+            collapsed_volume_pct: object.collapsed_volume_pct,
+            damaged_volume_pct: object.damaged_volume_pct,
             wrong_instance: self.is_other_first == Some(true),
-            kappa: limit.map(|l| l.kappa),
-            tau: limit.map(|l| l.tau_pct()),
-            d_ref: limit.map(|l| l.d_ref_pct),
-            deformation_ok: object.is_within(None),
+            kappa: object.kappa,
+            tau: object.tau,
+            d_ref: object.d_ref,
+            deformation_ok: object.deformation_ok,
             slip_ok: (config.criteria.require_no_slip && valid).then_some(no_slip),
             safety: false,
             safety_known: false,
             kappas: Vec::new(),
-            targets: rest.iter().map(|target| target.verdict(config.dt_s)).collect(),
+            targets: rest.into_iter().map(|target| target.verdict).collect(),
             missing_evidence: self.missing_evidence,
-            missing_deformation: object.series.peak.missing,
+            missing_deformation: object.missing_deformation,
             contact_success,
             contact_safety: false,
             peak_pad_force_n: object.peak_pad_force_n,
             mean_pad_force_n: object.mean_pad_force_n,
-            least_pad_force_n: object.grip.least_n,
+            least_pad_force_n: object.least_pad_force_n,
             grip_ratio: object.grip_ratio,
             gentle: goal && object.grip_ratio.is_some_and(|ratio| ratio <= config.criteria.gentle_ratio),
         };
         let parts = verdict.safety_parts(None);
-        verdict.safety = parts.is_safe(object.is_soft, verdict.deformation_ok);
-        let is_judged = !object.is_soft || verdict.deformation_ok.is_some();
+        verdict.safety = parts.is_safe(object.soft, verdict.deformation_ok);
+        let is_judged = !object.soft || verdict.deformation_ok.is_some();
         verdict.safety_known = valid && self.missing_evidence == 0 && is_judged && parts.targets_ok.is_some();
         verdict.contact_safety = contact_success && verdict.safety && no_slip;
         let at = |kappa: f64, tau_pct: f64| {
-            let deformation_ok = object.is_within(Some(kappa));
-            let safety = verdict.safety_parts(Some(kappa)).is_safe(object.is_soft, deformation_ok);
+            let deformation_ok = verdict.is_within(kappa).filter(|_| valid);
+            let safety = verdict.safety_parts(Some(kappa)).is_safe(object.soft, deformation_ok);
             KappaVerdict { kappa, tau_pct, deformation_ok, safety }
         };
         verdict.kappas = limit.iter().flat_map(|l| KAPPAS.map(|kappa| at(kappa, l.tau_at(kappa)))).collect();
@@ -616,6 +609,10 @@ impl Judge {
             target.observe_stage(is_over, next.is_some_and(|(number, ..)| predicates[number].is_placed));
         }
     }
+}
+
+fn earliest(drops: impl Iterator<Item = DropEvent>) -> Option<DropEvent> {
+    drops.reduce(|first, other| if other.time_s < first.time_s { other } else { first })
 }
 
 impl PredicateRule {

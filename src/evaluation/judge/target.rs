@@ -128,24 +128,44 @@ impl TargetMonitors {
         touch
     }
 
-    /// What was found, once the episode has ended.
-    pub(super) fn finish(self, config: &JudgeConfig, target: &Target, valid: bool) -> TargetResult {
+    /// What was found, if the episode ends here. `missing` is the drop of an episode that did not end validly.
+    pub(super) fn finish(
+        &self,
+        config: &JudgeConfig,
+        target: &Target,
+        missing: Option<DropEvent>,
+    ) -> TargetResult {
         let limit = target.limit.filter(|_| target.is_soft);
-        let slip_m = self.slip.slip_m();
-        TargetResult {
-            name: target.name.clone(),
-            is_soft: target.is_soft,
-            valid,
-            limit,
-            series: self.series.finish(limit.map(|limit| limit.tau_pct())),
-            crushed: self.crushed,
-            drop: self.drops.first,
-            slip_mm: 1e3 * slip_m,
+        let (slip_m, drop) = (self.slip.slip_m(), self.drops.first.or(missing));
+        let series = self.series.statistics(limit.map(|limit| limit.tau_pct()));
+        let percent = |share: Option<f64>| share.map(|share| 100.0 * share);
+        let verdict = TargetVerdict {
+            object: target.name.clone(),
+            soft: target.is_soft,
+            no_drop: drop.is_none(),
+            drop,
             no_slip: slip_m <= config.criteria.slip_m,
+            slip_mm: 1e3 * slip_m,
+            d_peak: series.peak.d_pct,
+            time_over_tau_s: limit.map(|_| series.steps_over_tau as f64 * config.dt_s),
+            missing_deformation: series.peak.missing,
+            collapsed_volume_pct: percent(self.crushed.collapsed),
+            damaged_volume_pct: percent(self.crushed.damaged),
+            kappa: limit.map(|limit| limit.kappa),
+            tau: limit.map(|limit| limit.tau_pct()),
+            d_ref: limit.map(|limit| limit.d_ref_pct),
+            deformation_ok: None,
             peak_pad_force_n: self.pad_forces.peak_n,
             mean_pad_force_n: self.pad_forces.sum_n / self.pad_forces.steps.max(1) as f64,
+            least_pad_force_n: self.grip.least_n,
             grip_ratio: self.grip.ratio(self.pad_forces.peak_n),
-            grip: self.grip,
+        };
+        let deformation_ok = verdict.is_within(None).filter(|_| target.is_soft && missing.is_none());
+        TargetResult {
+            verdict: TargetVerdict { deformation_ok, ..verdict },
+            limit,
+            series,
+            was_in_contact: self.grip.was_carried && !self.grip.lost_contact,
         }
     }
 }
@@ -153,57 +173,9 @@ impl TargetMonitors {
 /// What was found of a target.
 #[derive(Clone, Debug, Default)]
 pub(super) struct TargetResult {
-    name: String,
-    pub(super) is_soft: bool,
-    /// True if the episode ended validly.
-    valid: bool,
+    pub(super) verdict: TargetVerdict,
     pub(super) limit: Option<DeformationLimit>,
     pub(super) series: SeriesStatistics,
-    pub(super) crushed: CrushedShares,
-    drop: Option<DropEvent>,
-    pub(super) slip_mm: f64,
-    no_slip: bool,
-    pub(super) peak_pad_force_n: f64,
-    pub(super) mean_pad_force_n: f64,
-    pub(super) grip_ratio: Option<f64>,
-    pub(super) grip: GripMonitor,
-}
-
-impl TargetResult {
-    /// True if D stayed within κ·D_ref, with the κ of the limit if none is given; `None` for a rigid target and where
-    /// evidence is missing.
-    pub(super) fn is_within(&self, kappa: Option<f64>) -> Option<bool> {
-        let tau = self.limit.map(|limit| kappa.map_or_else(|| limit.tau_pct(), |kappa| limit.tau_at(kappa)));
-        if self.is_soft && self.valid { self.series.peak.is_within(tau) } else { None }
-    }
-
-    /// Time for which D exceeded τ in physics steps of `dt_s`, s; `None` without a limit.
-    pub(super) fn time_over_tau(&self, dt_s: f64) -> Option<f64> {
-        self.limit.map(|_| self.series.steps_over_tau as f64 * dt_s)
-    }
-
-    /// Its part of the verdict.
-    pub(super) fn verdict(&self, dt_s: f64) -> TargetVerdict {
-        TargetVerdict {
-            object: self.name.clone(),
-            soft: self.is_soft,
-            no_drop: self.drop.is_none(),
-            drop: self.drop,
-            no_slip: self.no_slip,
-            slip_mm: self.slip_mm,
-            d_peak: self.series.peak.d_pct,
-            time_over_tau_s: self.time_over_tau(dt_s),
-            missing_deformation: self.series.peak.missing,
-            collapsed_volume_pct: self.crushed.collapsed.map(|share| 100.0 * share),
-            damaged_volume_pct: self.crushed.damaged.map(|share| 100.0 * share),
-            kappa: self.limit.map(|limit| limit.kappa),
-            tau: self.limit.map(|limit| limit.tau_pct()),
-            d_ref: self.limit.map(|limit| limit.d_ref_pct),
-            deformation_ok: self.is_within(None),
-            peak_pad_force_n: self.peak_pad_force_n,
-            mean_pad_force_n: self.mean_pad_force_n,
-            least_pad_force_n: self.grip.least_n,
-            grip_ratio: self.grip_ratio,
-        }
-    }
+    /// True if both pads touched it throughout the carry.
+    pub(super) was_in_contact: bool,
 }

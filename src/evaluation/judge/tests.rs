@@ -411,7 +411,7 @@ fn the_series_of_deformation_is_summarised() {
 
 #[test]
 fn a_failed_episode_names_its_stage() {
-    let stage = |replay: &Replay| replay.judge.clone().finish(&Outcome::Budget).failed_stage;
+    let stage = |replay: &Replay| replay.judge.finish(&Outcome::Budget).failed_stage;
     let mut replay = Replay::new(config());
     replay.rest(2, -0.2);
     assert_eq!(stage(&replay), Some(TaskStage::Reach));
@@ -487,7 +487,7 @@ fn all_three() -> GoalNode {
 fn a_goal_of_several_parts_says_which_were_met() {
     let mut judge = Judge::new(two_targets(all_three()));
     feed(&mut judge, 30, &[true, false], &[0.1, 0.1], Some(true));
-    let verdict = judge.clone().finish(&Outcome::Budget);
+    let verdict = judge.finish(&Outcome::Budget);
     assert!(!verdict.goal && !verdict.safety);
     let met: Vec<_> = verdict.goal_parts.iter().map(|part| (part.holds, part.met_s.is_some())).collect();
     assert_eq!(met, [(true, true), (false, false), (true, true)]);
