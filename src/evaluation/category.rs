@@ -81,8 +81,3 @@ impl EpisodeCategory {
 /// Share of the volume beyond its collapse strain from which an object is called crushed, %. It is the share that
 /// defines D_ref.
 pub const CRUSHED_PCT: f64 = 5.0;
-
-/// True if enough of the volume collapsed for the object to be called crushed.
-pub fn is_crushed(collapsed_volume_pct: Option<f64>) -> bool {
-    collapsed_volume_pct.is_some_and(|pct| pct >= CRUSHED_PCT)
-}

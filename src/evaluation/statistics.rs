@@ -28,6 +28,11 @@ impl Rate {
         Self { rate, wilson95: wilson95(count, total), bootstrap95: None }
     }
 
+    /// Number of those counted among the `total` that the rate is of; 0 without a rate.
+    pub fn count(&self, total: usize) -> usize {
+        (0.01 * self.rate.unwrap_or(0.0) * total as f64).round() as usize
+    }
+
     /// The rate of what was never judged: null.
     pub fn not_judged() -> Self {
         Self::default()

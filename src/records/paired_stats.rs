@@ -66,11 +66,6 @@ pub fn group_by_task<'p, 'a>(pairs: &'p [EpisodePair<'a>]) -> impl Iterator<Item
     })
 }
 
-/// Peak D of a valid episode, % of the diagonal; `None` without a measurement.
-pub fn d_peak(record: &EpisodeRecord) -> Option<f64> {
-    record.verdict.d_peak.filter(|_| record.outcome.is_valid())
-}
-
 /// Largest peak D over τ of the objects that the goal moves, of a valid episode; `None` without a limit or a
 /// measurement.
 pub fn d_over_tau(record: &EpisodeRecord) -> Option<f64> {
@@ -104,7 +99,7 @@ pub struct PairedComparison {
     pub grip_ratio: PairedDifference,
     /// No other soft body beyond its own τ, %; where both runs know it.
     pub others_ok: PairedDifference,
-    /// Time over τ where both runs have one, s.
+    /// Longest time for which a target was over its τ, s.
     pub time_over_tau_s: PairedDifference,
     /// Episodes in which the robot touched a movable object other than the target, %; invalid ones included.
     pub wrong_contact: PairedDifference,
@@ -118,9 +113,9 @@ pub struct PairedComparison {
     pub d_p95: PairedDifference,
     /// Largest share of the volume of a target beyond its collapse strain, %.
     pub collapsed_volume_pct: PairedDifference,
-    /// Share of the target's volume that was ever beyond its damage strain, %.
+    /// Largest share of the volume of a target that was ever beyond its damage strain, %.
     pub damaged_volume_pct: PairedDifference,
-    /// Peak D where both runs have one, % of the diagonal.
+    /// Largest peak D of a target where both runs have one, % of its diagonal.
     pub d_peak: PairedDifference,
     /// Peak D over τ where both runs have both.
     pub d_over_tau: PairedDifference,
@@ -186,7 +181,7 @@ impl PairedComparison {
                     .iter()
                     .filter_map(|pair| Some([pair.first.verdict.others_ok?, pair.second.verdict.others_ok?])),
             ),
-            time_over_tau_s: mean(|r| r.verdict.time_over_tau_s),
+            time_over_tau_s: mean(EpisodeRecord::time_over_tau_s),
             wrong_contact: PairedDifference::from_failures(
                 pairs.iter().map(|pair| [pair.first, pair.second].map(touches_other)),
             ),
@@ -197,8 +192,8 @@ impl PairedComparison {
             d_final: mean(|r| r.verdict.d_final),
             d_p95: mean(|r| r.verdict.d_p95),
             collapsed_volume_pct: mean(EpisodeRecord::collapsed_volume_pct),
-            damaged_volume_pct: mean(|r| r.verdict.damaged_volume_pct),
-            d_peak: mean(d_peak),
+            damaged_volume_pct: mean(EpisodeRecord::damaged_volume_pct),
+            d_peak: mean(EpisodeRecord::d_peak),
             d_over_tau: mean(d_over_tau),
             metrics: names.into_iter().map(|name| (name.clone(), of_metric(name))).collect(),
         }

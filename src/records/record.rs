@@ -10,8 +10,11 @@ use serde::{Deserialize, Serialize, Serializer, ser::SerializeMap};
 
 use softvt_common::episode_id::EpisodeId;
 use softvt_common::text::decimal;
-use softvt_evaluation::category::{EpisodeCategory, is_crushed};
-use softvt_evaluation::verdict::{Outcome, Verdict};
+use softvt_evaluation::{
+    category::{CRUSHED_PCT, EpisodeCategory},
+    safety::{and_known, round_to_six_decimals},
+    verdict::{Outcome, TargetVerdict, Verdict},
+};
 use softvt_scene::{InitialStateOverride, SceneVariation};
 
 /// Id, task, target and policy of an episode: the first columns of its record.
@@ -253,53 +256,99 @@ impl EpisodeRecord {
         words.collect()
     }
 
+    /// The soft objects that the goal moves, the object of the task first.
+    pub fn soft_targets(&self) -> impl Iterator<Item = SoftTarget<'_>> {
+        let v = &self.verdict;
+        let object = self.header.soft.then_some(SoftTarget {
+            object: None,
+            d_peak: v.d_peak,
+            tau: v.tau,
+            d_ref: v.d_ref,
+            deformation_ok: v.deformation_ok,
+        });
+        let others = v.targets.iter().filter(|target| target.soft).map(|target| SoftTarget {
+            object: Some(target.object.as_str()),
+            d_peak: target.d_peak,
+            tau: target.tau,
+            d_ref: target.d_ref,
+            deformation_ok: target.deformation_ok,
+        });
+        object.into_iter().chain(others)
+    }
+
     /// True if an object that the goal moves is soft.
     pub fn has_soft_target(&self) -> bool {
-        self.header.soft || self.verdict.targets.iter().any(|target| target.soft)
+        self.soft_targets().next().is_some()
     }
 
     /// True if D stayed within the limit of each soft object that the goal moves, false if one is known to exceed its
     /// own; `None` where neither is known.
     pub fn is_within_limits(&self) -> Option<bool> {
-        let object = if self.header.soft { self.verdict.deformation_ok } else { Some(true) };
-        let others =
-            self.verdict.targets.iter().filter(|target| target.soft).map(|target| target.deformation_ok);
-        let all: Vec<Option<bool>> = others.chain([object]).collect();
-        match all.contains(&Some(false)) {
-            true => Some(false),
-            false => (!all.contains(&None)).then_some(true),
-        }
+        self.soft_targets().map(|target| target.deformation_ok).fold(Some(true), and_known)
+    }
+
+    /// True if D stayed within κ·D_ref of each soft object that the goal moves; false where that is unknown.
+    pub fn is_within_at(&self, kappa: f64) -> bool {
+        let is_object_within = !self.header.soft || self.verdict.is_within(kappa) == Some(true);
+        let are_others_within = self.verdict.safety_parts(Some(kappa)).targets_ok == Some(true);
+        self.outcome.is_valid() && is_object_within && are_others_within
+    }
+
+    /// Safety Success with κ·D_ref as the limit of each soft object that the goal moves.
+    pub fn is_safe_at(&self, kappa: f64) -> bool {
+        let parts = self.verdict.safety_parts(Some(kappa));
+        self.outcome.is_valid() && parts.is_safe(self.header.soft, self.verdict.is_within(kappa))
+    }
+
+    /// The smallest κ at which the episode [is safe](Self::is_safe_at); `None` without one.
+    pub fn safe_from(&self) -> Option<f64> {
+        let kappas = self.soft_targets().map(|target| Some(smallest_tau(target.d_peak?) / target.d_ref?));
+        let kappa = kappas.fold(Some(0.0), |largest: Option<f64>, kappa| Some(largest?.max(kappa?)))?;
+        self.is_safe_at(kappa).then_some(kappa)
     }
 
     /// True if a soft object that the goal moves has no limit.
     pub fn lacks_limit(&self) -> bool {
-        let mut others = self.verdict.targets.iter();
-        self.header.soft && self.verdict.tau.is_none()
-            || others.any(|target| target.soft && target.tau.is_none())
+        self.soft_targets().any(|target| target.tau.is_none())
     }
 
     /// The soft object that the goal moves with the largest peak D over τ; `None` without any that has both.
     pub fn most_deformed(&self) -> Option<DeformedTarget<'_>> {
-        let v = &self.verdict;
-        let object = self.header.soft.then_some((None, v.d_peak, v.tau));
-        let others = v.targets.iter().filter(|target| target.soft);
-        let others = others.map(|target| (Some(target.object.as_str()), target.d_peak, target.tau));
-        let all = object.into_iter().chain(others).filter_map(|(object, d_peak, tau)| {
+        let all = self.soft_targets().filter_map(|SoftTarget { object, d_peak, tau, .. }| {
             let (d_peak, tau) = d_peak.zip(tau)?;
             (tau > 0.0).then_some(DeformedTarget { object, d_peak, tau })
         });
         all.reduce(|worst, next| if next.ratio() > worst.ratio() { next } else { worst })
     }
 
+    /// The largest of a quantity over the objects that the goal moves.
+    fn largest(&self, of_object: Option<f64>, of: fn(&TargetVerdict) -> Option<f64>) -> Option<f64> {
+        self.verdict.targets.iter().filter_map(of).chain(of_object).reduce(f64::max)
+    }
+
+    /// Largest peak D of an object that the goal moves, % of its diagonal.
+    pub fn d_peak(&self) -> Option<f64> {
+        self.largest(self.verdict.d_peak, |target| target.d_peak)
+    }
+
+    /// Longest time for which D of an object that the goal moves exceeded its τ, s.
+    pub fn time_over_tau_s(&self) -> Option<f64> {
+        self.largest(self.verdict.time_over_tau_s, |target| target.time_over_tau_s)
+    }
+
     /// Largest share of the volume of an object that the goal moves that collapsed, %.
     pub fn collapsed_volume_pct(&self) -> Option<f64> {
-        let others = self.verdict.targets.iter().filter_map(|target| target.collapsed_volume_pct);
-        self.verdict.collapsed_volume_pct.into_iter().chain(others).reduce(f64::max)
+        self.largest(self.verdict.collapsed_volume_pct, |target| target.collapsed_volume_pct)
+    }
+
+    /// Largest share of the volume of an object that the goal moves that was damaged, %.
+    pub fn damaged_volume_pct(&self) -> Option<f64> {
+        self.largest(self.verdict.damaged_volume_pct, |target| target.damaged_volume_pct)
     }
 
     /// [`collapsed_volume_pct`](Self::collapsed_volume_pct), if it is large enough for the object to be called crushed.
     pub fn crushed_volume_pct(&self) -> Option<f64> {
-        self.collapsed_volume_pct().filter(|pct| is_crushed(Some(*pct)))
+        self.collapsed_volume_pct().filter(|pct| *pct >= CRUSHED_PCT)
     }
 
     /// True if the episode counts in DSR: Goal Success with D_peak ≤ τ of each target. Drops do not enter.
@@ -309,17 +358,33 @@ impl EpisodeRecord {
 
     /// True if the deformation of each soft target can be judged. An invalid episode with limits is judged: it fails.
     pub fn is_deformation_judged(&self) -> bool {
-        let v = &self.verdict;
-        let is_known = |ok: Option<bool>, tau: Option<f64>| {
-            if self.outcome.is_valid() { ok.is_some() } else { tau.is_some() }
-        };
-        let mut others = v.targets.iter().filter(|target| target.soft);
-        (!self.header.soft || is_known(v.deformation_ok, v.tau))
-            && others.all(|target| is_known(target.deformation_ok, target.tau))
+        let is_valid = self.outcome.is_valid();
+        self.soft_targets().all(|SoftTarget { deformation_ok, tau, .. }| match is_valid {
+            true => deformation_ok.is_some(),
+            false => tau.is_some(),
+        })
     }
 }
 
-/// A soft object that the goal moves, and its peak deformation.
+/// The smallest τ that admits a peak of `d_pct`, %; a τ has six decimals.
+fn smallest_tau(d_pct: f64) -> f64 {
+    let tau = round_to_six_decimals(d_pct);
+    if tau < d_pct { round_to_six_decimals(tau + 1e-6) } else { tau }
+}
+
+/// A soft object that the goal moves; the fields are those of the [`Verdict`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[allow(missing_docs)]
+pub struct SoftTarget<'a> {
+    /// Name in the scene; `None` for the object of the task.
+    pub object: Option<&'a str>,
+    pub d_peak: Option<f64>,
+    pub tau: Option<f64>,
+    pub d_ref: Option<f64>,
+    pub deformation_ok: Option<bool>,
+}
+
+/// The peak deformation of a [`SoftTarget`] with a limit.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DeformedTarget<'a> {
     /// Name in the scene; `None` for the object of the task.
@@ -346,7 +411,7 @@ impl std::fmt::Display for DeformedTarget<'_> {
 
 #[cfg(test)]
 pub(crate) mod tests {
-    use softvt_evaluation::verdict::{InvalidReason, TargetVerdict};
+    use softvt_evaluation::verdict::InvalidReason;
 
     use super::*;
 
@@ -361,23 +426,11 @@ pub(crate) mod tests {
         let other = TargetVerdict {
             object: "roll".to_owned(),
             soft: true,
-            no_drop: true,
-            drop: None,
-            no_slip: true,
-            slip_mm: 0.0,
             d_peak: Some(3.0),
-            missing_deformation: 0,
-            time_over_tau_s: None,
             collapsed_volume_pct: Some(60.0),
-            damaged_volume_pct: None,
-            kappa: Some(0.5),
             tau: Some(0.5),
-            d_ref: Some(1.0),
             deformation_ok: Some(false),
-            peak_pad_force_n: 1.0,
-            mean_pad_force_n: 1.0,
-            least_pad_force_n: None,
-            grip_ratio: None,
+            ..TargetVerdict::default()
         };
         assert_eq!((record.is_within_limits(), record.crushed_volume_pct()), (Some(true), None));
         record.verdict.targets = vec![other];

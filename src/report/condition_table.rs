@@ -11,7 +11,7 @@ use softvt_benchmark::ShiftValue;
 use softvt_common::text::{TextColumn, TextTable, counted, decimal, escape_control, shortened};
 use softvt_evaluation::statistics::{Distribution, Rate};
 use softvt_records::{
-    paired_stats::{PairedComparison, PairedDifference, d_over_tau, pair_episodes},
+    paired_stats::{PairedComparison, PairedDifference, pair_episodes},
     record::EpisodeRecord,
     summary::GroupScores,
 };
@@ -52,7 +52,7 @@ impl ConditionOutcome {
             goal_success_rate: scores.goal_success_rate,
             no_drop_rate: scores.no_drop_rate,
             safety_success_rate: scores.soft_safety_rate(),
-            d_over_tau: Distribution::from_values(records.iter().filter_map(d_over_tau).collect()),
+            d_over_tau: scores.d_over_tau,
             paired,
         }
     }

@@ -4,6 +4,8 @@
 #![warn(missing_docs, unreachable_pub)]
 
 pub mod actions;
+#[cfg(test)]
+mod agreement;
 pub mod commands;
 pub mod comparison;
 pub mod condition_effects;

@@ -9,11 +9,12 @@ use super::{
     stored_run::StoredRun,
 };
 use softvt_common::text::{TextColumn, TextTable, counted, decimal, shortened};
-use softvt_evaluation::statistics::{Rate, quantile};
+use softvt_evaluation::{category::EpisodeCategory, statistics::Rate};
 use softvt_records::{
-    paired_stats::{EpisodePair, PairedComparison, d_over_tau, pair_episodes},
+    paired_stats::{EpisodePair, PairedComparison, pair_episodes},
     paired_tests::{holm, letters},
     record::EpisodeRecord,
+    summary::GroupScores,
 };
 
 /// Level at which two runs count as different, after Holm's adjustment for the number of pairs.
@@ -75,8 +76,9 @@ impl PolicyRanking {
         };
         let mut runs: Vec<(String, Vec<EpisodeRecord>)> =
             names(folders).into_iter().zip(folders.iter().map(|runs| in_common(runs))).collect();
-        let is_safe = |record: &EpisodeRecord| record.outcome.is_valid() && record.verdict.safety;
-        runs.sort_by_key(|(_, records)| Reverse(records.iter().filter(|r| is_safe(r)).count()));
+        let scores =
+            |records: &[EpisodeRecord]| GroupScores::from_records(&records.iter().collect::<Vec<_>>());
+        runs.sort_by_key(|(_, records)| Reverse(scores(records).count(EpisodeCategory::Safe)));
         let compared = |a: usize, b: usize| {
             let pairs = runs[a].1.iter().zip(&runs[b].1).map(|(first, second)| EpisodePair { first, second });
             PairedComparison::from_pairs(&pairs.collect::<Vec<_>>())
@@ -84,13 +86,11 @@ impl PolicyRanking {
         let safety_letters = letters_of(runs.len(), |a, b| compared(a, b).safety.p);
         let d_letters = letters_of(runs.len(), |a, b| compared(a, b).d_over_tau.p);
         let ranked = runs.iter().zip(safety_letters.into_iter().zip(d_letters));
-        let runs = ranked.map(|((name, records), (safety_letters, d_over_tau_letters))| RankedRun {
-            name: name.clone(),
-            goal: Rate::from_test(records, |r| r.outcome.is_valid() && r.verdict.goal),
-            safety: Rate::from_test(records, is_safe),
-            d_over_tau: median(records.iter().filter_map(d_over_tau).collect()),
-            safety_letters,
-            d_over_tau_letters,
+        let runs = ranked.map(|((name, records), (safety_letters, d_over_tau_letters))| {
+            let GroupScores { goal_success_rate: goal, safety_success_rate: safety, d_over_tau, .. } =
+                scores(records);
+            let (name, d_over_tau) = (name.clone(), d_over_tau.median);
+            RankedRun { name, goal, safety, d_over_tau, safety_letters, d_over_tau_letters }
         });
         Ok(Self {
             episodes: common.len(),
@@ -146,9 +146,4 @@ fn interval(rate: &Rate) -> String {
         Some([low, high]) => format!("{} [{low:.0}, {high:.0}]", decimal(rate.rate, 0)),
         None => decimal(rate.rate, 0),
     }
-}
-
-fn median(mut values: Vec<f64>) -> Option<f64> {
-    values.sort_by(f64::total_cmp);
-    quantile(&values, 0.5)
 }

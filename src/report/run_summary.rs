@@ -5,7 +5,10 @@ use std::collections::{BTreeMap, BTreeSet};
 use super::stored_run::StoredRun;
 use softvt_common::text::decimal;
 use softvt_evaluation::{drop::DropReason, verdict::Outcome};
-use softvt_records::{record::EpisodeRecord, summary::SuiteSummary};
+use softvt_records::{
+    record::{EpisodeRecord, SoftTarget},
+    summary::SuiteSummary,
+};
 
 /// A run with its results.
 #[derive(Clone, Debug)]
@@ -128,19 +131,16 @@ pub fn unsafe_reason(record: &EpisodeRecord) -> Option<String> {
         return None;
     }
     let mut parts = failures(record);
-    match (v.d_peak, v.tau) {
-        (Some(d), Some(tau)) if d > tau => parts.push(format!("D {d:.2} % is above τ {tau:.2} %")),
-        (_, None) if record.header.soft => parts.push("the object has no threshold".to_owned()),
-        _ => {}
+    for SoftTarget { object, d_peak, tau, .. } in record.soft_targets() {
+        let name = object.map(|object| format!("{object}: ")).unwrap_or_default();
+        match (d_peak, tau) {
+            (Some(d), Some(tau)) if d > tau => parts.push(format!("{name}D {d:.2} % is above τ {tau:.2} %")),
+            (_, None) => parts.push(format!("{} has no threshold", object.unwrap_or("the object"))),
+            _ => {}
+        }
     }
-    let without_limit = v.targets.iter().filter(|target| target.soft && target.tau.is_none());
-    parts.extend(without_limit.map(|target| format!("{} has no threshold", target.object)));
     if v.slip_ok == Some(false) {
         parts.push(format!("it slipped by {:.1} mm in the hand", v.slip_mm));
-    }
-    for target in v.targets.iter().filter(|target| target.deformation_ok == Some(false)) {
-        let [d, tau] = [target.d_peak, target.tau].map(|x| decimal(x, 2));
-        parts.push(format!("{}: D {d} % is above its τ {tau} %", target.object));
     }
     for other in v.others.iter().filter(|other| other.deformation_ok == Some(false)) {
         let [d, tau] = [other.d_peak, other.tau].map(|x| decimal(x, 2));

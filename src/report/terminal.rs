@@ -131,7 +131,7 @@ fn push_tasks(text: &mut StyledText, summary: &SuiteSummary, format: TerminalFor
     let name_width = room.clamp(12, 40);
     let row = |number: &str, name: &str, scores: &GroupScores| {
         let GroupScores { episodes: n, goal_success_rate, .. } = scores;
-        let goal = (0.01 * goal_success_rate.rate.unwrap_or(0.0) * *n as f64).round();
+        let goal = goal_success_rate.count(*n);
         let is_judged = scores.is_soft() && scores.safety_success_rate.rate.is_some();
         let safe =
             if is_judged { format!("{}/{n}", scores.count(EpisodeCategory::Safe)) } else { "N/A".to_owned() };
@@ -285,7 +285,7 @@ fn resolution(scores: &GroupScores) -> String {
     let rate = if scores.is_soft() { scores.safety_success_rate } else { scores.goal_success_rate };
     let n = scores.episodes;
     let wide = if n < FEW_EPISODES { format!("n = {n}: intervals are wide; ") } else { String::new() };
-    match DetectableDifference::new((0.01 * rate.rate.unwrap_or(0.0) * n as f64).round() as usize, n) {
+    match DetectableDifference::new(rate.count(n), n) {
         Some(DetectableDifference { smallest, .. }) => {
             let (episodes, points) = (counted(n, "episode"), significant(smallest, 2));
             format!("{wide}{episodes} distinguish policies that differ by at least {points} points")

@@ -19,10 +19,8 @@ pub(super) fn push_details(text: &mut StyledText, summary: &SuiteSummary) {
     push_grip(text, scores);
     push_deformation(text, summary);
     push_harm_and_stages(text, scores);
-    let safe = (0.01 * scores.safety_success_rate.rate.unwrap_or(0.0) * scores.episodes as f64).round();
-    if let Some(DetectableDifference { smallest, found }) =
-        DetectableDifference::new(safe as usize, scores.episodes)
-    {
+    let safe = scores.safety_success_rate.count(scores.episodes);
+    if let Some(DetectableDifference { smallest, found }) = DetectableDifference::new(safe, scores.episodes) {
         let [smallest, found] = [smallest, found].map(|points| significant(points, 2));
         let found = format!("{smallest} points; in 4 of 5 cases {found}");
         push_named(text, "Detectable difference", &found);

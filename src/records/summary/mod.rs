@@ -14,7 +14,6 @@ use super::{
 };
 use softvt_evaluation::{
     category::EpisodeCategory,
-    safety::DeformationLimit,
     stage::TaskStage,
     statistics::{Distribution, Rate, mean, stratified_bootstrap},
     verdict::Outcome,
@@ -81,20 +80,20 @@ pub struct GroupScores {
     /// Peak D over τ of the target for which it is largest, of the valid episodes that have both.
     #[serde(default)]
     pub d_over_tau: Distribution,
-    /// Smallest and largest τ that was applied, %; null without any.
+    /// Smallest and largest τ that was applied to a target, %; null without any.
     pub tau_range: Option<TauRange>,
     /// Deformation within the episodes.
     pub within_episodes: EpisodeDeformation,
-    /// Peak D of all episodes with a soft target, %; invalid ones rank as worst.
+    /// Largest peak D of a target in all episodes with a soft one, %; invalid ones rank as worst.
     pub deformation: Distribution,
-    /// Peak D of the valid episodes that reached the goal, %.
+    /// Largest peak D of a target in the valid episodes that reached the goal, %.
     pub deformation_goal: Distribution,
     /// Metrics of the suite over the valid episodes that have them, by name.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub metrics: BTreeMap<String, Distribution>,
     /// Largest share of the volume of a target beyond its collapse strain, over all valid episodes, %.
     pub collapsed_volume: Distribution,
-    /// Share of the target's volume that was ever beyond its damage strain, over all valid episodes, %.
+    /// Largest share of the volume of a target that was ever beyond its damage strain, over all valid episodes, %.
     pub damaged_volume: Distribution,
 }
 
@@ -107,7 +106,7 @@ pub struct TauRange {
     pub max: f64,
 }
 
-/// D within an episode, each the mean over the valid episodes that have it; null without any.
+/// D of the object within an episode, each the mean over the valid episodes that have it; null without any.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct EpisodeDeformation {
     /// Mean D, %.
@@ -116,7 +115,7 @@ pub struct EpisodeDeformation {
     pub d_final: Option<f64>,
     /// 95th percentile of D, %.
     pub d_p95: Option<f64>,
-    /// Time over τ, s.
+    /// Longest time for which a target was over its τ, s.
     pub time_over_tau_s: Option<f64>,
 }
 
@@ -286,7 +285,7 @@ impl GroupScores {
         };
         let safety = safety_rate(|r| r.verdict.safety);
         let peaks = |reached: fn(&EpisodeRecord) -> bool| -> Vec<f64> {
-            valid.iter().filter(|r| reached(r)).filter_map(|r| r.verdict.d_peak).collect()
+            valid.iter().filter(|r| reached(r)).filter_map(|r| r.d_peak()).collect()
         };
         let mean_of = |value: fn(&EpisodeRecord) -> Option<f64>| {
             mean(&valid.iter().filter_map(|r| value(r)).collect::<Vec<f64>>())
@@ -303,7 +302,7 @@ impl GroupScores {
         let is_crushed_over_limit = |r: &&EpisodeRecord| {
             r.category() == EpisodeCategory::OverLimit && r.crushed_volume_pct().is_some()
         };
-        let taus = || soft.iter().filter_map(|r| r.verdict.tau);
+        let taus = || soft.iter().flat_map(|r| r.soft_targets()).filter_map(|target| target.tau);
         let tau_range = taus().reduce(f64::min).zip(taus().reduce(f64::max));
         let over_valid = |value: fn(&EpisodeRecord) -> Option<f64>| {
             Distribution::from_values(valid.iter().filter_map(|r| value(r)).collect())
@@ -341,7 +340,7 @@ impl GroupScores {
                 d_mean: mean_of(|r| r.verdict.d_mean),
                 d_final: mean_of(|r| r.verdict.d_final),
                 d_p95: mean_of(|r| r.verdict.d_p95),
-                time_over_tau_s: mean_of(|r| r.verdict.time_over_tau_s),
+                time_over_tau_s: mean_of(EpisodeRecord::time_over_tau_s),
             },
             deformation: Distribution::with_invalid(
                 peaks(|_| true),
@@ -357,7 +356,7 @@ impl GroupScores {
                 })
                 .collect(),
             collapsed_volume: over_valid(EpisodeRecord::collapsed_volume_pct),
-            damaged_volume: over_valid(|r| r.verdict.damaged_volume_pct),
+            damaged_volume: over_valid(EpisodeRecord::damaged_volume_pct),
         }
     }
 }
@@ -374,10 +373,10 @@ impl GroupScores {
         self.no_drop_rate = self.no_drop_rate.with_bootstrap(&outcomes(|r| r.verdict.no_drop));
         self.safety_success_rate = self.safety_success_rate.with_bootstrap(&outcomes(|r| r.verdict.safety));
         self.dsr = self.dsr.map(|dsr| dsr.with_bootstrap(&outcomes(EpisodeRecord::is_deformation_safe)));
-        let within = |r: &EpisodeRecord| r.verdict.deformation_ok == Some(true);
+        let within = |r: &EpisodeRecord| r.is_within_limits() == Some(true);
         self.deformation_ok_rate =
             self.deformation_ok_rate.map(|rate| rate.with_bootstrap(&outcomes(within)));
-        let peak = |r: &&EpisodeRecord| r.verdict.d_peak.filter(|_| r.outcome.is_valid());
+        let peak = |r: &&EpisodeRecord| r.d_peak().filter(|_| r.outcome.is_valid());
         let peaks: Vec<Vec<f64>> =
             tasks.values().map(|group| group.iter().filter_map(peak).collect()).collect();
         self.deformation.bootstrap95 = stratified_bootstrap(&peaks);
@@ -467,25 +466,11 @@ fn kappa_curve(records: &[&EpisodeRecord]) -> Vec<RatesAtKappa> {
         }
         RatesAtKappa {
             kappa,
-            deformation_ok_rate: Rate::from_test(records, |r| {
-                let is_object_within = !r.header.soft || is_within(r, kappa) == Some(true);
-                is_object_within
-                    && r.outcome.is_valid()
-                    && r.verdict.safety_parts(Some(kappa)).targets_ok == Some(true)
-            }),
-            safety_success_rate: Rate::from_test(records, |r| {
-                r.verdict.safety_parts(Some(kappa)).is_safe(r.header.soft, is_within(r, kappa))
-            }),
+            deformation_ok_rate: Rate::from_test(records, |r| r.is_within_at(kappa)),
+            safety_success_rate: Rate::from_test(records, |r| r.is_safe_at(kappa)),
         }
     };
     (0..=KAPPA_STEPS).map(row).collect()
-}
-
-/// True if D_peak ≤ κ·D_ref; `None` if that is unknown.
-fn is_within(record: &EpisodeRecord, kappa: f64) -> Option<bool> {
-    let verdict = &record.verdict;
-    let limit = verdict.d_ref.map(|d_ref_pct| DeformationLimit { d_ref_pct, kappa });
-    verdict.peak().is_within(limit.map(|l| l.tau_pct())).filter(|_| record.outcome.is_valid())
 }
 
 #[cfg(test)]

@@ -62,17 +62,6 @@ fn groups_are_in_order_and_do_not_depend_on_the_order_of_episodes() {
 }
 
 #[test]
-fn the_kappa_curve_rises_and_meets_the_nominal_rate_at_the_nominal_kappa() {
-    let s = SuiteSummary::from_records("suite", "expert", &records());
-    let at = |kappa: f64| s.kappa.iter().find(|row| row.kappa == kappa).unwrap().safety_success_rate.rate;
-    assert_eq!((s.kappa.len(), at(0.0), at(1.0)), (21, Some(0.0), Some(50.0)));
-    assert_eq!(at(0.5), s.scores.safety_success_rate.rate);
-    // D_ref is 2: τ(0.3) = 0.6 admits 0.5, τ(0.7) = 1.4 not yet 1.5.
-    assert_eq!((at(0.2), at(0.3), at(0.7), at(0.75)), (Some(0.0), Some(25.0), Some(25.0), Some(50.0)));
-    assert!(s.kappa.windows(2).all(|w| w[0].safety_success_rate.rate <= w[1].safety_success_rate.rate));
-}
-
-#[test]
 fn a_rigid_suite_has_no_deformation() {
     let rigid: Vec<_> = records()
         .into_iter()

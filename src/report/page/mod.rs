@@ -8,7 +8,7 @@ mod images;
 mod marks;
 mod matrix;
 mod overview;
-mod strictness;
+pub(super) mod strictness;
 mod strips;
 
 use std::{

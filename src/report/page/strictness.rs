@@ -90,33 +90,22 @@ fn style(index: usize) -> String {
 
 /// A point of the curve of Safety Success over κ.
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct CurvePoint {
-    kappa: f64,
-    percent: f64,
+pub(crate) struct CurvePoint {
+    pub(crate) kappa: f64,
+    pub(crate) percent: f64,
     /// 95 % Wilson interval, %.
     interval: [f64; 2],
 }
 
-/// The corners of the curve. Safety Success is a step function of κ: it rises where κ reaches D_peak / D_ref of an
+/// The corners of the curve. Safety Success is a step function of κ: it rises at [`EpisodeRecord::safe_from`] of an
 /// episode. Empty if nothing was judged.
-fn curve_corners(run: &RunSummary) -> Vec<CurvePoint> {
+pub(crate) fn curve_corners(run: &RunSummary) -> Vec<CurvePoint> {
     if run.summary.kappa.iter().all(|row| row.safety_success_rate.rate.is_none()) {
         return Vec::new();
     }
     let records = &run.run.records;
-    let safe_from = |record: &EpisodeRecord| {
-        let v = &record.verdict;
-        if !(record.outcome.is_valid() && v.goal && v.no_drop && v.missing_deformation == 0)
-            || v.targets.iter().any(|target| target.missing_deformation > 0)
-        {
-            return None;
-        }
-        let object = if record.header.soft { v.d_peak.zip(v.d_ref) } else { Some((0.0, 1.0)) };
-        let others =
-            v.targets.iter().filter(|target| target.soft).map(|target| target.d_peak.zip(target.d_ref));
-        others.chain([object]).try_fold(0.0, |kappa: f64, of| of.map(|(d, d_ref)| kappa.max(d / d_ref)))
-    };
-    let mut steps: Vec<f64> = records.iter().filter_map(safe_from).filter(|kappa| *kappa <= 1.0).collect();
+    let steps = records.iter().filter_map(EpisodeRecord::safe_from);
+    let mut steps: Vec<f64> = steps.filter(|kappa| *kappa <= 1.0).collect();
     steps.sort_by(f64::total_cmp);
     let corner = |kappa: f64, count: usize| {
         let rate = Rate::new(count, records.len());
