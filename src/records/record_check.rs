@@ -1,6 +1,6 @@
 //! Reading of an episode record: a line that contradicts itself, or holds a key that no record has, is refused.
 
-use serde_json::Value;
+use serde_json::{Value, json};
 
 use super::record::EpisodeRecord;
 use softvt_evaluation::{
@@ -20,20 +20,6 @@ pub enum RecordError {
     Contradiction(String),
 }
 
-/// Keys that a record leaves out at their default.
-const OMITTED: [&str; 10] = [
-    "privileged",
-    "variation",
-    "origin",
-    "goal_parts",
-    "others",
-    "targets",
-    "first_far_command",
-    "gave_up",
-    "notes",
-    "metrics",
-];
-
 /// Tolerance of sums and means, relative to 1.
 const TOLERANCE: f64 = 1e-9;
 
@@ -45,10 +31,8 @@ impl EpisodeRecord {
     pub fn from_json(text: &[u8]) -> Result<Self, RecordError> {
         let record: Self = serde_json::from_slice(text)?;
         // serde cannot refuse unknown keys in flattened structs.
-        let (read, mut known) = (serde_json::from_slice(text)?, serde_json::to_value(&record)?);
-        OMITTED.iter().for_each(|key| known[*key] = known[*key].take());
-        if let Some(key) = unknown_key(&read, &known) {
-            return Err(RecordError::UnknownKey(key));
+        if let Some(path) = unknown_key(&serde_json::from_slice(text)?, "", &serde_json::to_value(&record)?) {
+            return Err(RecordError::UnknownKey(path[1..].replace('/', ".")));
         }
         record.check().map_err(RecordError::Contradiction)?;
         Ok(record)
@@ -170,8 +154,7 @@ impl EpisodeRecord {
             return Err(format!("time_over_tau_s is {over}, and d_peak {d} is not above tau {tau}"));
         }
         if v.deformation_ok != ok(v.tau) {
-            let got = or_null(v.deformation_ok);
-            return Err(format!("deformation_ok is {got}, and d_peak is {d}, tau {tau}"));
+            return Err(not_within(v.deformation_ok, v.d_peak, v.tau));
         }
         let required = v.safety_parts(None);
         let parts = format!("goal is {}, no_drop {}", v.goal, v.no_drop);
@@ -244,9 +227,7 @@ impl EpisodeRecord {
             let TargetVerdict { object, d_peak, tau, deformation_ok, .. } = target;
             let ok = target.is_within(None).filter(|_| target.soft && self.outcome.is_valid());
             if *deformation_ok != ok {
-                let [d, tau] = [d_peak, tau].map(|x| or_null(*x));
-                let got = or_null(*deformation_ok);
-                return Err(format!("{object}: deformation_ok is {got}, and d_peak is {d}, tau {tau}"));
+                return Err(format!("{object}: {}", not_within(*deformation_ok, *d_peak, *tau)));
             }
             if let (Some(tau), Some(d_ref_pct), Some(kappa)) = (target.tau, target.d_ref, target.kappa) {
                 check_tau(
@@ -287,9 +268,7 @@ impl EpisodeRecord {
                 None => is_above == Some(true) && self.outcome.is_valid(),
             };
             if is_contradiction {
-                let [d, tau] = [d_peak, tau].map(|x| or_null(*x));
-                let got = or_null(*deformation_ok);
-                return Err(format!("{object}: deformation_ok is {got}, and d_peak is {d}, tau {tau}"));
+                return Err(format!("{object}: {}", not_within(*deformation_ok, *d_peak, *tau)));
             }
         }
         let peak = v.others.iter().filter_map(|other| other.d_peak).reduce(f64::max);
@@ -315,31 +294,43 @@ fn check_tau(name: &str, tau: f64, limit: &DeformationLimit, kappa: f64) -> Resu
     Err(format!("{name} is {tau}, and {kappa} of d_ref {} is {}", limit.d_ref_pct, limit.tau_at(kappa)))
 }
 
+/// The contradiction of a `deformation_ok` with D and τ.
+fn not_within(got: Option<bool>, d_peak: Option<f64>, tau: Option<f64>) -> String {
+    let ([d, tau], got) = ([d_peak, tau].map(or_null), or_null(got));
+    format!("deformation_ok is {got}, and d_peak is {d}, tau {tau}")
+}
+
 /// The value, or the word of JSON for none.
 fn or_null(value: Option<impl ToString>) -> String {
     value.map_or("null".to_owned(), |value| value.to_string())
 }
 
-/// Path of the first key of `read` that `known` lacks.
-fn unknown_key(read: &Value, known: &Value) -> Option<String> {
-    match (read, known) {
-        (Value::Object(read), Value::Object(known)) => {
-            read.iter().find_map(|(key, value)| match known.get(key) {
-                None => Some(key.clone()),
-                Some(own) => unknown_key(value, own).map(|inner| format!("{key}.{inner}")),
-            })
-        }
-        (Value::Array(read), Value::Array(known)) => {
-            read.iter().zip(known).find_map(|(value, own)| unknown_key(value, own))
-        }
+/// JSON pointer of the first key at or below `path` of `record` that is no field. `known` is what the fields at `path`
+/// write, which leave out some defaults.
+fn unknown_key(record: &Value, path: &str, known: &Value) -> Option<String> {
+    match (record.pointer(path)?, known) {
+        (Value::Object(read), Value::Object(known)) => read.keys().find_map(|key| {
+            let path = format!("{path}/{}", key.replace('~', "~0").replace('/', "~1"));
+            match known.get(key) {
+                Some(own) => unknown_key(record, &path, own),
+                None => (!is_field(record.clone(), &path)).then_some(path),
+            }
+        }),
+        (Value::Array(_), Value::Array(known)) => (0..)
+            .zip(known)
+            .find_map(|(at, own): (usize, _)| unknown_key(record, &format!("{path}/{at}"), own)),
         _ => None,
     }
 }
 
+/// True if a field reads the value at a JSON pointer: none takes lists of empty lists.
+fn is_field(mut record: Value, path: &str) -> bool {
+    record.pointer_mut(path).into_iter().for_each(|value| *value = json!([[[]]]));
+    serde_json::from_value::<EpisodeRecord>(record).is_err()
+}
+
 #[cfg(test)]
 mod tests {
-    use serde_json::{Value, json};
-
     use super::*;
     use crate::record::tests::sample;
 
@@ -360,6 +351,24 @@ mod tests {
         let mut whole = serde_json::to_value(sample()).unwrap();
         (whole["gave_up"], whole["variation"]) = (Value::Null, Value::Null);
         assert_eq!(EpisodeRecord::from_json(whole.to_string().as_bytes()).unwrap(), sample());
+    }
+
+    #[test]
+    fn a_record_may_state_every_default() {
+        let mut line = serde_json::to_value(sample()).unwrap();
+        let part = json!({ "name": "bun on plate", "negated": false, "holds": true, "met_s": 1.0 });
+        line["goal_parts"] = json!([part]);
+        for key in ["task_prompt", "variation", "origin", "first_far_command", "gave_up"] {
+            line[key] = Value::Null;
+        }
+        (line["privileged"], line["clamped_steps"]) = (json!(false), json!(0));
+        (line["others"], line["targets"]) = (json!([]), json!([]));
+        (line["notes"], line["metrics"]) = (json!({}), json!({}));
+        let record = EpisodeRecord::from_json(line.to_string().as_bytes()).unwrap();
+        assert_eq!(record.verdict.goal_parts[0].name, "bun on plate");
+        line["goal_parts"][0]["colour"] = json!("red");
+        let unknown = EpisodeRecord::from_json(line.to_string().as_bytes()).unwrap_err().to_string();
+        assert!(unknown.ends_with("unknown key goal_parts.0.colour"), "{unknown}");
     }
 
     #[test]
