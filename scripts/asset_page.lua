@@ -1,7 +1,7 @@
 -- The asset page, docs/assets.md: image, tactile image, size, mass, material, τ and safe window of every asset.
 --
 --   softvt scripts/asset_page.lua
---   softvt scripts/asset_page.lua --images=off          only the page
+--   softvt scripts/asset_page.lua --pictures=off        only the page
 --   softvt scripts/asset_page.lua --asset my_pastry --folder my_page
 local names = require "asset_names"
 local sources = require "strain_sources"
@@ -14,7 +14,7 @@ end
 
 local opt = softvt.options {
   asset = { default = STANDARD, help = "assets to show" },
-  images = { default = true, help = "also write the images" },
+  pictures = { default = true, help = "also write the images" },
   folder = { default = "docs", help = "folder of the page" },
   edge = { default = 128, unit = "pixels", integer = true, min = 32, max = 512, help = "edge of each image" },
 }
@@ -228,7 +228,7 @@ return softvt.experiment {
       made[row.asset] = row.text
     end
     local files = { [opt.folder .. "/assets.md"] = page(made) }
-    for _, name in ipairs(opt.images and opt.asset or {}) do
+    for _, name in ipairs(opt.pictures and opt.asset or {}) do
       local at = ("%s/images/assets/%s"):format(opt.folder, name)
       files[at .. ".png"] = views.portrait(assets[name], opt.edge)
       if graspable(assets[name]) then

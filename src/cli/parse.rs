@@ -1,12 +1,13 @@
 //! Parsing of the command line, with the options that the script declares.
 
-use std::path::Path;
+use std::{collections::BTreeSet, path::Path};
 
 use clap::{
-    Arg, ArgMatches, CommandFactory, FromArgMatches, Subcommand, error::ErrorKind, parser::ValueSource,
+    Arg, ArgMatches, Args, CommandFactory, FromArgMatches, Subcommand, error::ErrorKind, parser::ValueSource,
 };
 
 use super::{
+    args::ScriptArgs,
     commands::{Command, run::RunArgs},
     error::CliError,
     output::{print, print_table, terminal_format},
@@ -79,27 +80,31 @@ fn short_help(command: clap::Command) -> String {
 }
 
 /// Adds the options of a script to every command that takes the script, in a section of their own.
-fn with_script_options(
-    mut command: clap::Command,
-    options: &[OptionSpec],
-) -> Result<clap::Command, CliError> {
-    let flags = command.get_arguments().filter_map(|arg| arg.get_long()).map(str::to_owned);
-    let reserved: Vec<String> = flags.chain(["help".into(), "version".into()]).collect();
-    for option in options {
-        let arg = script_arg(option, &option.help_text(options));
-        if let Some(long) = arg.get_long().filter(|long| reserved.iter().any(|flag| flag == long)) {
-            return Err(CliError::input(format!(
-                "the script declares the option --{long}, which is a flag of softvt; rename it"
-            )));
-        }
-        for name in ["check", "serve", "view", "record"] {
-            command = command.mut_subcommand(name, |subcommand| subcommand.arg(&arg));
-        }
-        command = command
-            .mut_subcommand("dataset", |dataset| dataset.mut_subcommand("import", |import| import.arg(&arg)))
-            .arg(arg);
+fn with_script_options(command: clap::Command, options: &[OptionSpec]) -> Result<clap::Command, CliError> {
+    let mut flags = BTreeSet::from(["help", "version"]);
+    collect_flags(&command, &mut flags);
+    let args: Vec<Arg> =
+        options.iter().map(|option| script_arg(option, &option.help_text(options))).collect();
+    if let Some(long) = args.iter().filter_map(Arg::get_long).find(|long| flags.contains(long)) {
+        return Err(CliError::input(format!(
+            "the script declares the option --{long}, which is a flag of softvt; rename it"
+        )));
     }
-    Ok(command)
+    Ok(with_script_args(command, &args))
+}
+
+/// Adds the long flags of a command and of its subcommands.
+fn collect_flags<'a>(command: &'a clap::Command, flags: &mut BTreeSet<&'a str>) {
+    flags.extend(command.get_arguments().filter_map(Arg::get_long));
+    command.get_subcommands().for_each(|subcommand| collect_flags(subcommand, flags));
+}
+
+/// Adds `args` to a command and its subcommands, where they have [`ScriptArgs`].
+fn with_script_args(command: clap::Command, args: &[Arg]) -> clap::Command {
+    let command = command.mut_subcommands(|subcommand| with_script_args(subcommand, args));
+    let takes_script =
+        command.get_groups().any(|group| Some(group.get_id()) == ScriptArgs::group_id().as_ref());
+    if takes_script { command.args(args) } else { command }
 }
 
 /// Start of the identifier of a script's option among the arguments; a colon cannot occur in those of the commands.
@@ -216,6 +221,42 @@ mod tests {
     #[test]
     fn the_definition_of_the_command_line_is_consistent() {
         clap_command().debug_assert();
+    }
+
+    /// The command of `softvt WORDS`, in which `x.lua` is a script with an option.
+    fn with_option(name: &str, words: &str) -> Result<Option<Command>, CliError> {
+        let folder = tempfile::tempdir().expect("a folder");
+        let file = folder.path().join("x.lua");
+        std::fs::write(&file, format!("softvt.options {{ {name} = {{ default = 1 }} }}")).expect("written");
+        let words = words.replace("x.lua", file.to_str().expect("text"));
+        parse(&["softvt"].into_iter().chain(words.split_whitespace()).map(str::to_owned).collect::<Vec<_>>())
+    }
+
+    #[test]
+    fn every_command_that_takes_a_script_takes_the_options_of_the_script() {
+        for words in [
+            "x.lua",
+            "check x.lua",
+            "view x.lua",
+            "watch x.lua",
+            "record x.lua --out made",
+            "serve x.lua",
+            "dataset import x.lua a.hdf5 --out made",
+        ] {
+            let mut command =
+                with_option("gap_mm", &format!("{words} --gap-mm=3")).expect(words).expect(words);
+            assert_eq!(command.script_mut().expect(words).options, ["--gap-mm=3"], "{words}");
+        }
+    }
+
+    #[test]
+    fn an_option_of_a_script_cannot_have_the_name_of_a_flag_of_any_command() {
+        for name in ["seed", "demos", "keep", "port", "images", "require"] {
+            let message = with_option(name, "x.lua").expect_err(name).to_string();
+            let expected =
+                format!("the script declares the option --{name}, which is a flag of softvt; rename it");
+            assert!(message.ends_with(&expected), "{message}");
+        }
     }
 
     #[test]

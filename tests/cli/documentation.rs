@@ -198,7 +198,7 @@ fn commands_on_the_pages_are_valid() {
 #[test]
 fn the_asset_page_is_current() {
     let project = Project::new(&[]);
-    project.succeeds("scripts/asset_page.lua --images=off --out made");
+    project.succeeds("scripts/asset_page.lua --pictures=off --out made");
     let (kept, made) = (read("docs/assets.md"), project.text("made/docs/assets.md"));
     assert!(kept == made, "docs/assets.md is out of date: run softvt scripts/asset_page.lua");
     let mut bytes = 0;
