@@ -11,7 +11,6 @@ use crate::{
     episode_list::{EpisodeJob, EpisodeList},
     error::RunError,
     friction::{friction_warnings, layout_friction_warnings},
-    scene_pool::ScenePool,
     selection::select_episodes,
     suite_run::SuiteRun,
 };
@@ -24,13 +23,12 @@ use softvt_common::{
 use softvt_geometry::{Aabb, Vec3};
 use softvt_rollout::{AssetCache, SensorAssets, scene_warnings};
 use softvt_scene::{Body, Object, Scene};
-use softvt_script::{LoadedScript, SceneChanges};
+use softvt_script::{EpisodeSetup, LoadedScript, SceneChanges};
 
 /// Checks suites one after the other. Those that share assets load them once.
 pub struct SuiteChecker<'a> {
     config: &'a RunConfig,
     script: &'a LoadedScript,
-    scenes: ScenePool<'a>,
     assets: AssetCache,
     /// Fingerprints of the assets that have settled in a scene.
     settled: Mutex<BTreeSet<String>>,
@@ -41,16 +39,7 @@ impl<'a> SuiteChecker<'a> {
     /// A checker for the suites of a script.
     pub fn new(ConfiguredScript { config, script }: &'a ConfiguredScript) -> Self {
         let (assets, sensor_assets) = (AssetCache::approximate(), SensorAssets::default());
-        let (settled_assets, settled) = (AssetCache::default(), Mutex::default());
-        Self {
-            config,
-            script,
-            scenes: ScenePool::new(script),
-            assets,
-            settled_assets,
-            settled,
-            sensor_assets,
-        }
+        Self { config, script, assets, settled: Mutex::default(), sensor_assets }
     }
 
     /// Builds and checks the scenes of the first episodes of every task on all processors, lets the objects settle,
@@ -70,13 +59,13 @@ impl<'a> SuiteChecker<'a> {
             ..SuiteRun::new(self.config, self.script, suite, none, PathBuf::new())?
         };
         let jobs = EpisodeList::of_tasks(&tasks, episodes, None);
-        let mut found = check_scenes(&run, &self.scenes, &jobs)?;
-        found.warnings.extend(changing_defaults(&run, &self.scenes, &jobs)?);
+        let mut found = check_scenes(&run, &jobs)?;
+        found.warnings.extend(changing_defaults(&run, &jobs)?);
         found.warnings.extend(self.settle(&run, &jobs, std::mem::take(&mut found.scenes))?);
         self.config.observer.end();
         found.warnings.into_iter().for_each(&mut warn);
         let run = SuiteRun { jobs: select_episodes(self.config, suite, &tasks), ..run };
-        let judged = run.scan_limits(&self.scenes)?.judged;
+        let judged = run.scan_limits()?.judged;
         for asset in found.without_strain.intersection(&judged) {
             warn(format!(
                 "asset {asset}: its material has neither collapse_strain nor damage_strain, so that its limit says where the press \
@@ -160,11 +149,10 @@ struct LayoutOfTask {
 /// Distance of places that count as the same, m.
 const SAME_PLACE_M: f64 = 1e-6;
 
-fn check_scenes(run: &SuiteRun, scenes: &ScenePool, jobs: &EpisodeList) -> Result<SceneFindings, RunError> {
+fn check_scenes(run: &SuiteRun, jobs: &EpisodeList) -> Result<SceneFindings, RunError> {
     let mut all = SceneFindings::default();
     let check_scene = |EpisodeJob { task, episode }: EpisodeJob| -> Result<SceneFindings, RunError> {
-        let setup =
-            scenes.with(|builder| builder.build(&run.episode_id(task, episode), &run.changes()))??;
+        let setup = run.open_episode(&run.episode_id(task, episode))?;
         let mut warnings = scene_warnings(task, &setup.scene, &run.assets);
         warnings.extend(friction_warnings(run, task, &setup));
         warnings.extend(layout_friction_warnings(run, &setup));
@@ -232,11 +220,7 @@ fn layout_conflicts(layouts: &BTreeMap<LayoutOfTask, BTreeMap<String, Vec3>>) ->
 }
 
 /// Warnings about shifts of a suite that change its first scene though they have their default value.
-fn changing_defaults(
-    run: &SuiteRun,
-    scenes: &ScenePool,
-    jobs: &EpisodeList,
-) -> Result<Vec<String>, RunError> {
+fn changing_defaults(run: &SuiteRun, jobs: &EpisodeList) -> Result<Vec<String>, RunError> {
     let mut warnings = Vec::new();
     if jobs.is_empty() {
         return Ok(warnings);
@@ -245,7 +229,7 @@ fn changing_defaults(
     for shift in &run.suite.shifts {
         let value = ShiftValue { name: shift.name.clone(), value: shift.default };
         let changes = SceneChanges { shifts: vec![value], ..run.changes() };
-        let setup = scenes.with(|builder| builder.build(&run.episode_id(task, episode), &changes))??;
+        let setup = EpisodeSetup::open(run.loaded, &run.episode_id(task, episode), &changes)?;
         if setup.is_shifted() {
             warnings.push(format!(
                 "shift {}: its default, {}, changes the scene; give the value that changes nothing",

@@ -32,7 +32,6 @@ pub mod recording;
 pub mod replay;
 mod run_manifest;
 mod runner;
-mod scene_pool;
 pub mod selection;
 mod served_runs;
 mod serving;

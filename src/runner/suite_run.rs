@@ -16,7 +16,6 @@ use crate::{
     limits::{CalibrationFiles, Calibrations, LimitScan, SceneLimits},
     policy::{ControllerFactory, DeclaredStreams},
     recorded_runs::{RecordedRuns, ReplaySource},
-    scene_pool::ScenePool,
     selection::{select_episodes, select_tasks},
 };
 use softvt_benchmark::{ObjectType, ShiftValue, Suite, Task, settings::Settings};
@@ -267,7 +266,7 @@ impl<'a> SuiteRun<'a> {
     ///
     /// # Errors
     /// A calibration file that is not valid.
-    pub(crate) fn scan_limits(&self, scenes: &ScenePool) -> Result<Calibrations, RunError> {
+    pub(crate) fn scan_limits(&self) -> Result<Calibrations, RunError> {
         if !self.reads_limits {
             return Ok(Calibrations::default());
         }
@@ -277,7 +276,7 @@ impl<'a> SuiteRun<'a> {
             tasks.len(),
             self.config.thread_count(),
             cancel::requested,
-            |job| self.scan_task(scenes, tasks[job]),
+            |job| self.scan_task(tasks[job]),
             |_, found| {
                 found.into_iter().for_each(|(index, limits)| scan.add(index, limits));
                 Ok(())
@@ -288,22 +287,16 @@ impl<'a> SuiteRun<'a> {
     }
 
     /// Limits in the first episodes of a task. All shards of a run look at the same episodes.
-    fn scan_task(
-        &self,
-        scenes: &ScenePool,
-        task: &Task,
-    ) -> Result<BTreeMap<EpisodeIndex, SceneLimits>, RunError> {
+    fn scan_task(&self, task: &Task) -> Result<BTreeMap<EpisodeIndex, SceneLimits>, RunError> {
         let of_task = self.jobs.episodes_of(task.id);
         let episodes: Vec<u32> = match self.config.shard {
             Some(_) => (0..self.config.episodes_of(self.suite)).take(MAX_SCANNED_EPISODES).collect(),
             None => of_task.take(MAX_SCANNED_EPISODES).collect(),
         };
         let mut found = BTreeMap::new();
-        let changes = self.changes();
         for episode in episodes {
-            let opened = scenes.with(|builder| builder.build(&self.episode_id(task, episode), &changes));
-            // Errors are told when the episode is opened.
-            let Ok(Ok(opened)) = opened else { break };
+            // Errors are told when the episode is run.
+            let Ok(opened) = self.open_episode(&self.episode_id(task, episode)) else { break };
             found.insert(EpisodeIndex { task: task.id, episode }, self.limits_of(task, &opened.scene)?);
         }
         Ok(found)
@@ -437,7 +430,7 @@ impl<'a> SuiteRun<'a> {
     pub fn prepare(self) -> Result<PreparedRun<'a>, RunError> {
         self.config.observer.work(&format!("checking the scenes of {}", self.name));
         let force_observed = self.check_first_episodes()?;
-        let calibrations = self.scan_limits(&ScenePool::new(self.loaded))?;
+        let calibrations = self.scan_limits()?;
         let mut sources = self.sources();
         sources.extend(calibrations.sources.clone());
         self.config.observer.end();

@@ -56,3 +56,20 @@ fn selected_episodes_are_those_of_a_whole_run() {
     let video = selected(&[1]).out("other").with(video).error();
     assert!(video.contains("runs only episode 1 of each task"), "{video}");
 }
+
+#[test]
+fn limits_in_run_json_are_of_fresh_interpreters_for_any_threads() {
+    let scene = "softvt.layout(\"one\", function(scene)\n";
+    let counted = "count = count + 1 local cube = softvt.asset { name = \"cube\" .. count, shape = shape, \
+                   body = softvt.soft { youngs_pa = 2e4, poisson = 0.3, density = 300 } }\n";
+    let text = Small { task: "budget_steps = 2", ..Small::default() }.text();
+    let text = format!("local count = 0\n{}", text.replace(scene, &format!("{scene}{counted}")));
+    let project = Project::new(&[("x.lua", &text)]);
+    for threads in [1, 2] {
+        let run = project.run("x.lua").episodes(3).policy("noop").threads(threads);
+        let records = run.out(&threads.to_string()).finish().records();
+        assert!(records.iter().all(|record| record.header.asset == "cube1"), "{records:#?}");
+        let limits = &project.json(&format!("{threads}/run.json"))["thresholds"];
+        assert_eq!(*limits, serde_json::json!({ "cube1": null }), "{threads} threads");
+    }
+}

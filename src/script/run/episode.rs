@@ -114,9 +114,8 @@ impl EpisodeSetup {
     }
 }
 
-/// Builds the scenes of many episodes in one virtual machine, for checks without a simulation. Global state that one
-/// layout changes is seen by the next.
-pub struct SceneBuilder {
+/// Builds the scene of an episode in a new virtual machine, so that no other episode has changed its global state.
+struct SceneBuilder {
     instance: Arc<ScriptInstance>,
     /// The suites of the plan, by name.
     suites: BTreeMap<String, Suite>,
@@ -128,7 +127,7 @@ impl SceneBuilder {
     ///
     /// # Errors
     /// If the script fails.
-    pub fn open(loaded: &LoadedScript) -> Result<Self, ScriptError> {
+    fn open(loaded: &LoadedScript) -> Result<Self, ScriptError> {
         let suites = loaded.plan.suites().iter().map(|suite| (suite.name.clone(), suite.clone()));
         let instance = Arc::new(loaded.sources.instance()?);
         Ok(Self { instance, suites: suites.collect(), secret: loaded.secret.clone() })
@@ -138,7 +137,7 @@ impl SceneBuilder {
     ///
     /// # Errors
     /// As [`EpisodeSetup::open`].
-    pub fn build(&self, id: &EpisodeId, changes: &SceneChanges) -> Result<EpisodeSetup, ScriptError> {
+    fn build(&self, id: &EpisodeId, changes: &SceneChanges) -> Result<EpisodeSetup, ScriptError> {
         let vm = &self.instance.vm;
         let FoundTask { suite, task } = self.instance.find_task(&id.suite, id.task)?;
         self.check_suite(&suite).map_err(|e| vm.explain(&e))?;
