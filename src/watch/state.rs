@@ -60,20 +60,22 @@ pub(crate) fn state_message(episode: &mut Episode, moving: &[MovingObject]) -> R
 
 /// What the judge and the robot measure.
 fn measured(episode: &Episode) -> Value {
-    let (trace, verdict) = (episode.trace(), episode.verdict());
+    let (trace, record) = (episode.trace(), episode.record(None));
+    let verdict = &record.verdict;
     let target = &episode.sim.objects[episode.target()].name;
     let target = trace.objects.iter().find(|object| object.name == *target);
     json!({
         "time_s": trace.time_s,
         "d_pct": target.and_then(|object| object.d_pct),
-        "d_peak_pct": verdict.d_peak,
+        "peak_over_tau": record.most_deformed().map(|target| target.ratio()),
         "tau_pct": verdict.tau,
         "pad_force_n": trace.pad_force_n,
         "slip_mm": verdict.slip_mm,
         "width_mm": 1e3 * trace.gripper_width_m,
         "closure": trace.closure,
         "grip_ratio": verdict.grip_ratio,
-        "collapsed_pct": verdict.collapsed_volume_pct,
+        "collapsed_pct": record.collapsed_volume_pct(),
+        "is_crushed": record.crushed_volume_pct().is_some(),
         "no_drop": verdict.no_drop,
         "goal_parts": verdict.goal_parts,
     })

@@ -40,10 +40,9 @@ function fixed(value, digits, unit = "") {
 // Shows the verdict so far, or the final one.
 function showBadge(measured) {
   const badge = $("badge"), is_last = player.end && Math.floor(player.cursor) >= player.states.length - 1;
-  const peak = measured.tau_pct ? measured.d_peak_pct / measured.tau_pct : null;
+  const peak = measured.peak_over_tau;
   const is_over = peak !== null && peak > 1;
-  // The share of the volume from which docs/looks.md calls an object crushed.
-  const word = !is_over ? "within τ" : measured.collapsed_pct >= 5 ? "crushed" : "over the limit";
+  const word = !is_over ? "within τ" : measured.is_crushed ? "crushed" : "over the limit";
   let text = peak === null ? "no limit of D" : `${word} so far: peak D/τ ${peak.toFixed(2)}`;
   let is_harmed = is_over || !measured.no_drop;
   if (!measured.no_drop) text += ", dropped";
@@ -52,7 +51,7 @@ function showBadge(measured) {
     is_harmed = !verdict.safety;
     text = `Goal ${verdict.goal ? "✓" : "✗"}  Safety ${verdict.safety ? "✓" : "✗"}`;
     if (peak !== null) text += `  peak D/τ ${peak.toFixed(2)}`;
-    if (is_over && measured.collapsed_pct >= 5) text += "  crushed";
+    if (is_over && measured.is_crushed) text += "  crushed";
     if (!verdict.no_drop) text += "  dropped";
   }
   badge.hidden = false;
