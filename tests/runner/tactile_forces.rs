@@ -4,51 +4,34 @@ use softvt::script::ExperimentRow;
 
 use crate::support::Project;
 
-/// Grips a block at a closure, lifts and holds it. Returns rows of both fingers at each stage.
-const HOLD: &str = r#"local block = softvt.asset {
-  name = "block", shape = softvt.shape.box { size = { 0.06, 0.04, 0.05 } }:grounded(), body = BODY,
-}
-local floor = softvt.asset { name = "floor", shape = softvt.shape.box { size = { 1, 1, 0.05 } }:translate(0, 0, -0.025), body = softvt.static {} }
-local layout = softvt.layout("held", function(scene)
-  scene:add { name = "floor", asset = floor, position = { 0, 0, 0 } }
-  scene:add { name = "block", asset = block, at = { 0, 0 } }
-end)
-return softvt.experiment {
-  name = "hold",
-  grid = { closure = { CLOSURE } },
-  run = function(point)
-    local sim, rows = softvt.simulate { layout = layout, settings = SETTINGS }, {}
-    local function note(when)
-      for _, side in ipairs { "left", "right" } do
-        local felt, x, y, most = sim:tactile(side), 0, 0, 0
-        for i, from in ipairs(felt.initial) do
-          local dx, dy = felt.present[i][1] - from[1], felt.present[i][2] - from[2]
-          x, y, most = x + dx / 99, y + dy / 99, math.max(most, math.abs(dx), math.abs(dy))
-        end
-        rows[#rows + 1] = { when = when, side = side, x = x, y = y, most = most, force = felt.force, mean = felt.image:mean(), depth_mm = felt.depth_mm }
-      end
-    end
-    note "open"
-    assert(sim:drive(function(arm)
-      local at = softvt.pose { position = { 0, 0, 0.027 } }
-      arm:move_to(at:translated { 0, 0, 0.08 })
-      arm:move_to(at)
-      arm:close_to(point.closure)
-      arm:wait(0.5)
-    end))
-    note "gripped"
-    assert(sim:drive(function(arm) arm:move_by({ 0, 0, 0.08 }, { speed = 0.1 }) arm:wait(0.5) end))
-    note "lifted"
-    assert(sim:wait(2))
-    note "held"
-    return rows
-  end,
-}
-"#;
+const HOLD: &str = include_str!("../data/tactile_hold.lua");
 
 fn rows(body: &str, closure: &str, settings: &str) -> Vec<ExperimentRow> {
     let text = HOLD.replace("BODY", body).replace("CLOSURE", closure).replace("SETTINGS", settings);
     Project::new(&[("hold.lua", &text)]).run("hold.lua").rows()
+}
+
+const FOLLOW: &str = include_str!("../data/markers_follow.lua");
+
+#[test]
+fn markers_follow_a_stuck_motion_by_the_shares_that_the_documentation_states() {
+    let page =
+        std::fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/docs/tactile.md")).expect("a page");
+    let rows = Project::new(&[("follow.lua", FOLLOW)]).run("follow.lua").rows();
+    for row in &rows {
+        let start = format!("| {} |", row["shape"].as_str().expect("a text"));
+        let stated = page.lines().find(|line| line.starts_with(&start)).expect("a row of the page");
+        let stated: Vec<&str> = stated.split('|').skip(2).map(str::trim).collect();
+        for (motion, stated) in ["sideways", "along", "twist"].into_iter().zip(stated) {
+            let percent: f64 = stated.trim_end_matches(" %").parse().expect("a percentage");
+            let found = 100.0 * number(row, motion);
+            assert!(
+                (found - percent).abs() < 2.0,
+                "{start} {motion}: {found} %, and the page states {stated}"
+            );
+        }
+    }
+    assert_eq!(rows.len(), 2);
 }
 
 fn number(row: &ExperimentRow, key: &str) -> f64 {
