@@ -252,7 +252,7 @@ mod tests {
     #[test]
     fn an_option_of_a_script_cannot_have_the_name_of_a_flag_of_any_command() {
         for name in ["seed", "demos", "keep", "port", "images", "require"] {
-            let message = with_option(name, "x.lua").expect_err(name).to_string();
+            let message = with_option(name, "x.lua").expect_err(name).message;
             let expected =
                 format!("the script declares the option --{name}, which is a flag of softvt; rename it");
             assert!(message.ends_with(&expected), "{message}");

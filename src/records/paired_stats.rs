@@ -69,7 +69,7 @@ pub fn group_by_task<'p, 'a>(pairs: &'p [EpisodePair<'a>]) -> impl Iterator<Item
 /// Largest peak D over τ of the objects that the goal moves, of a valid episode; `None` without a limit or a
 /// measurement.
 pub fn d_over_tau(record: &EpisodeRecord) -> Option<f64> {
-    record.most_deformed().filter(|_| record.outcome.is_valid()).map(|target| target.ratio())
+    record.most_deformed().filter(|_| record.outcome.is_valid())?.ratio()
 }
 
 /// Differences of the second run from the first. An invalid episode succeeds at nothing and has no deformation.

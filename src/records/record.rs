@@ -302,8 +302,8 @@ impl EpisodeRecord {
 
     /// The smallest κ at which the episode [is safe](Self::is_safe_at); `None` without one.
     pub fn safe_from(&self) -> Option<f64> {
-        let kappas = self.soft_targets().map(|target| Some(smallest_tau(target.d_peak?) / target.d_ref?));
-        let kappa = kappas.fold(Some(0.0), |largest: Option<f64>, kappa| Some(largest?.max(kappa?)))?;
+        let mut kappas = self.soft_targets().map(|target| Some(smallest_tau(target.d_peak?) / target.d_ref?));
+        let kappa = kappas.try_fold(0.0, |largest: f64, kappa| Some(largest.max(kappa?)))?;
         self.is_safe_at(kappa).then_some(kappa)
     }
 
@@ -313,11 +313,8 @@ impl EpisodeRecord {
     }
 
     /// The soft object that the goal moves with the largest peak D over τ; `None` without any that has both.
-    pub fn most_deformed(&self) -> Option<DeformedTarget<'_>> {
-        let all = self.soft_targets().filter_map(|SoftTarget { object, d_peak, tau, .. }| {
-            let (d_peak, tau) = d_peak.zip(tau)?;
-            (tau > 0.0).then_some(DeformedTarget { object, d_peak, tau })
-        });
+    pub fn most_deformed(&self) -> Option<SoftTarget<'_>> {
+        let all = self.soft_targets().filter(|target| target.ratio().is_some());
         all.reduce(|worst, next| if next.ratio() > worst.ratio() { next } else { worst })
     }
 
@@ -384,28 +381,17 @@ pub struct SoftTarget<'a> {
     pub deformation_ok: Option<bool>,
 }
 
-/// The peak deformation of a [`SoftTarget`] with a limit.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct DeformedTarget<'a> {
-    /// Name in the scene; `None` for the object of the task.
-    pub object: Option<&'a str>,
-    /// Peak D, % of its diagonal.
-    pub d_peak: f64,
-    /// Its limit, %.
-    pub tau: f64,
-}
-
-impl DeformedTarget<'_> {
-    /// Peak D over τ.
-    pub fn ratio(&self) -> f64 {
-        self.d_peak / self.tau
+impl SoftTarget<'_> {
+    /// Peak D over τ; `None` without either.
+    pub fn ratio(&self) -> Option<f64> {
+        self.d_peak.zip(self.tau.filter(|tau| *tau > 0.0)).map(|(d_peak, tau)| d_peak / tau)
     }
 }
 
-impl std::fmt::Display for DeformedTarget<'_> {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+impl fmt::Display for SoftTarget<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let of = self.object.map(|object| format!(" of {object}")).unwrap_or_default();
-        write!(f, "D {:.2} %{of} = {:.2} × limit", self.d_peak, self.ratio())
+        write!(f, "D {} %{of} = {} × limit", decimal(self.d_peak, 2), decimal(self.ratio(), 2))
     }
 }
 

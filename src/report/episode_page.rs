@@ -89,7 +89,7 @@ pub fn sentence(record: &EpisodeRecord, times: &DeformationTimes) -> String {
     let worst_s = times.worst_s;
     let d = match (record.most_deformed(), record.verdict.d_peak) {
         // An object that was hardly touched is not described by its D.
-        (Some(target), _) if target.ratio() < SMALLEST_RATIO => String::new(),
+        (Some(target), _) if target.ratio() < Some(SMALLEST_RATIO) => String::new(),
         // The time is that of the object of the task.
         (Some(target), _) if target.object.is_some() => format!(": {target}"),
         (Some(target), _) => format!(": {target} at {worst_s:.2} s"),

@@ -67,7 +67,7 @@ fn measured(episode: &Episode) -> Value {
     json!({
         "time_s": trace.time_s,
         "d_pct": target.and_then(|object| object.d_pct),
-        "peak_over_tau": record.most_deformed().map(|target| target.ratio()),
+        "peak_over_tau": record.most_deformed().and_then(|target| target.ratio()),
         "tau_pct": verdict.tau,
         "pad_force_n": trace.pad_force_n,
         "slip_mm": verdict.slip_mm,
