@@ -6,6 +6,7 @@ mod command_resolver;
 pub mod decode;
 pub mod encode;
 mod grip_hysteresis;
+pub mod http;
 mod interface;
 pub mod msgpack;
 mod observation;

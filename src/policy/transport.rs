@@ -6,7 +6,7 @@
 
 use std::{
     io::{self, ErrorKind, Read, Write},
-    net::TcpStream,
+    net::{Shutdown, TcpStream},
     time::{Duration, Instant},
 };
 
@@ -59,6 +59,14 @@ impl PollingStream {
     pub fn set_nonblocking(&mut self, nonblocking: bool) -> io::Result<()> {
         self.interrupted = (!nonblocking).then(Instant::now);
         self.stream.set_nonblocking(nonblocking)
+    }
+
+    /// Tells the other side that nothing more will be sent.
+    ///
+    /// # Errors
+    /// The connection is gone.
+    pub fn end_output(&self) -> io::Result<()> {
+        self.stream.shutdown(Shutdown::Write)
     }
 
     fn interrupt(&mut self) -> io::Result<()> {

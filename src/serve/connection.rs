@@ -2,29 +2,24 @@
 
 use std::{
     io::Read,
-    net::TcpStream,
     time::{Duration, Instant},
 };
 
 use rmpv::Value;
 use tungstenite::{
-    Message, WebSocket, accept_hdr_with_config,
-    handshake::server::{ErrorResponse, Request, Response},
+    Message, WebSocket,
     protocol::{CloseFrame, frame::coding::CloseCode},
 };
 
-use super::access::Refusal;
 use softvt_common::cancel::CancelFlag;
-
 use softvt_policy::{
+    http::HttpRequest,
     msgpack::{MsgpackError, unpack},
-    transport::{self, PollingStream, TransportError, complete_handshake, websocket_config, would_block},
+    transport::{self, PollingStream, TransportError, would_block},
 };
 
 /// Longest message that is accepted; a state of 50,000 actions has 2.7 MiB.
 const MAX_MESSAGE_BYTES: usize = 4 << 20;
-/// Time limit for a client's handshake.
-pub(super) const HANDSHAKE_TIMEOUT: Duration = Duration::from_secs(10);
 /// Time limit for sending a response. Generous, since the client may be paused in a debugger.
 const WRITE_TIMEOUT: Duration = Duration::from_secs(60);
 /// Time for a message to a client once the server is cancelled.
@@ -48,7 +43,7 @@ pub(super) enum ReceiveError {
     Closed,
 }
 
-/// The server is cancelled, the client was refused, or a time limit has passed.
+/// The server is cancelled, or a time limit has passed.
 #[derive(Debug)]
 pub(super) struct Aborted;
 
@@ -60,32 +55,9 @@ pub(super) struct Connection<'a> {
 }
 
 impl<'a> Connection<'a> {
-    /// Accepts a websocket, unless `check` refuses the request: then the client receives the HTTP status and the
-    /// reason.
-    ///
-    /// # Errors
-    /// The client does not complete the handshake, or is refused.
-    pub(super) fn accept(
-        stream: TcpStream,
-        cancel: &'a CancelFlag,
-        check: impl FnOnce(&Request) -> Result<(), Refusal>,
-    ) -> Result<Self, TransportError<Aborted>> {
-        // The type of the error is tungstenite's.
-        #[allow(clippy::result_large_err)]
-        let callback = |request: &Request, response: Response| match check(request) {
-            Ok(()) => Ok(response),
-            Err(Refusal { status, reason }) => {
-                let mut refused = ErrorResponse::new(Some(reason));
-                *refused.status_mut() = status;
-                Err(refused)
-            }
-        };
-        let stream = PollingStream::new(stream).map_err(|error| TransportError::Socket(error.into()))?;
-        let deadline = Instant::now() + HANDSHAKE_TIMEOUT;
-        let config = websocket_config(MAX_MESSAGE_BYTES);
-        let handshake = accept_hdr_with_config(stream, callback, Some(config));
-        let socket = complete_handshake(handshake, || may_go_on(cancel, deadline))?;
-        Ok(Self { socket, cancel })
+    /// Accepts the websocket that a request asks for. `None` if it asks for none, as the client is told, or has gone.
+    pub(super) fn accept(request: HttpRequest, cancel: &'a CancelFlag) -> Option<Self> {
+        Some(Self { socket: request.upgrade(MAX_MESSAGE_BYTES)?, cancel })
     }
 
     /// Waits for the next message. Sends pings meanwhile.
@@ -161,8 +133,4 @@ impl<'a> Connection<'a> {
             }
         }
     }
-}
-
-fn may_go_on(cancel: &CancelFlag, deadline: Instant) -> Result<(), Aborted> {
-    if cancel.requested() || Instant::now() > deadline { Err(Aborted) } else { Ok(()) }
 }

@@ -17,4 +17,5 @@ mod state;
 pub use access::AccessRules;
 pub use config::{EpisodeRecorder, RequestError, ServerConfig};
 pub use response::hello;
-pub use server::{listen, serve};
+pub use server::serve;
+pub use softvt_policy::http::listen;

@@ -2,8 +2,8 @@
 //! an episode is simulated and afterwards.
 //!
 //! A [`Watch`] has one thread that simulates the episode that was asked for last and appends a message for every
-//! control step to a feed; a server thread answers the requests of browsers, and each open page has a thread that
-//! sends it the feed over a websocket. A script that is saved again starts its episode anew.
+//! control step to a feed; a server answers the requests of browsers in a thread each, and sends the feed to each open
+//! page over a websocket. A script that is saved again starts its episode anew.
 #![warn(missing_docs, unreachable_pub)]
 
 mod feed;
@@ -16,5 +16,5 @@ mod stage;
 mod state;
 mod teleop;
 
-pub use server::{Watch, WatchError};
+pub use server::Watch;
 pub use stage::{Program, Selection};

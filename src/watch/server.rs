@@ -4,20 +4,21 @@
 //! the address of this machine, so that no other page and no other user of the machine can use the server.
 
 use std::{
-    io::{self, Read},
+    io,
     net::{Ipv4Addr, SocketAddr, TcpListener},
     sync::{
         Arc, Mutex, PoisonError,
         mpsc::{Sender, channel},
     },
     thread,
-    time::Duration,
 };
 
 use serde::de::DeserializeOwned;
 use serde_json::{Map, Value};
-use tiny_http::{Header, Method, Request, Response, Server};
-use tungstenite::{Message as WebsocketMessage, WebSocket, handshake::derive_accept_key, protocol::Role};
+use tungstenite::{
+    Message as WebsocketMessage,
+    http::{HeaderName, Method, StatusCode, header},
+};
 
 use crate::{
     feed::{Feed, Place},
@@ -27,20 +28,19 @@ use crate::{
     teleop::{Drive, DriveInput},
 };
 use softvt_common::cancel;
+use softvt_policy::{
+    http::{self, HttpRequest, Refusal},
+    transport::send_frame,
+};
 
-/// Longest wait for a request before the server looks whether the program ends.
-const WAIT: Duration = Duration::from_millis(200);
-/// Largest request of a page, bytes.
-const MAX_REQUEST: u64 = 1 << 16;
-
-/// A server cannot be started.
-#[derive(Debug)]
-pub struct WatchError(pub io::Error);
+/// Connections at a time, open pages included.
+const MAX_CONNECTIONS: usize = 128;
+/// Longest message of a page over the websocket, bytes; it sends none.
+const MAX_MESSAGE_BYTES: usize = 1 << 10;
 
 /// What requests read and change.
-#[derive(Clone)]
-struct Page {
-    access: Arc<Access>,
+struct Page<'a> {
+    access: &'a Access,
     feed: Arc<Feed>,
     selections: Sender<Selection>,
     drive: Arc<DriveInput>,
@@ -55,8 +55,8 @@ struct Access {
 
 /// A page with the episodes of a program.
 pub struct Watch {
-    server: Server,
-    access: Arc<Access>,
+    listener: TcpListener,
+    access: Access,
 }
 
 impl Watch {
@@ -64,12 +64,10 @@ impl Watch {
     ///
     /// # Errors
     /// The port cannot be used.
-    pub fn listen(port: u16, token: String) -> Result<Self, WatchError> {
-        let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, port)).map_err(WatchError)?;
-        let address = listener.local_addr().map_err(WatchError)?;
-        let server = Server::from_listener(listener, None);
-        let server = server.map_err(|error| WatchError(io::Error::other(error)))?;
-        Ok(Self { server, access: Arc::new(Access { address, token }) })
+    pub fn listen(port: u16, token: String) -> io::Result<Self> {
+        let listener = http::listen(&Ipv4Addr::LOCALHOST.to_string(), port)?;
+        let address = listener.local_addr()?;
+        Ok(Self { listener, access: Access { address, token } })
     }
 
     /// Address of the page.
@@ -78,15 +76,12 @@ impl Watch {
     }
 
     /// Simulates and answers pages until the program is cancelled.
-    ///
-    /// # Errors
-    /// The server has failed.
-    pub fn run(&self, program: Program) -> Result<(), WatchError> {
+    pub fn run(&self, program: Program) {
         let (selections, requests) = channel();
         let (feed, drive) = (Arc::new(Feed::default()), Arc::new(DriveInput::default()));
         let menu = Arc::new(Mutex::default());
         let page = Page {
-            access: self.access.clone(),
+            access: &self.access,
             feed: feed.clone(),
             selections,
             drive: drive.clone(),
@@ -96,32 +91,20 @@ impl Watch {
         let stage = Stage { program, feed, requests, drive, menu, files, is_outdated: false, is_new: false };
         thread::scope(|scope| {
             scope.spawn(move || stage.run());
-            while !cancel::requested() {
-                let request = match self.server.recv_timeout(WAIT) {
-                    Ok(Some(request)) => request,
-                    Ok(None) => continue,
-                    // No connection is accepted any more.
-                    Err(error) => {
-                        cancel::request();
-                        return Err(WatchError(error));
-                    }
-                };
-                let page = page.clone();
-                // Not awaited at the end: a page that reads nothing would hold up the program.
-                thread::spawn(move || page.answer(request));
-            }
-            Ok(())
-        })
+            http::serve(&self.listener, MAX_CONNECTIONS, &cancel::WITH_PROCESS, |request| {
+                page.answer(request)
+            });
+        });
     }
 }
 
-impl Page {
+impl Page<'_> {
     /// Answers one request.
-    fn answer(&self, mut request: Request) {
-        let url = request.url().to_owned();
-        let (path, query) = url.split_once('?').unwrap_or((&url, ""));
+    fn answer(&self, mut request: HttpRequest) {
+        let (method, url) = (request.head.method().clone(), request.head.uri().clone());
+        let (path, query) = (url.path(), url.query().unwrap_or_default());
         if !self.access.is_own_page(&request) {
-            return respond(request, 403, "requests of other pages are refused\n");
+            return request.respond(StatusCode::FORBIDDEN, "requests of other pages are refused\n");
         }
         // The scripts of the page are the same for everybody.
         if let Some(file) = page::file(path).filter(|_| path != "/" || self.access.has_token(query)) {
@@ -129,19 +112,17 @@ impl Page {
         }
         if !self.access.has_token(query) {
             let text = "open the address that softvt watch has printed; it ends with a token\n";
-            return respond(request, 401, text);
+            return request.respond(StatusCode::UNAUTHORIZED, text);
         }
-        match (request.method(), path) {
-            (Method::Get, "/feed") => send_feed(request, &self.feed),
-            (Method::Post, "/select") => {
-                let selected = read_json(&mut request).and_then(|selection| self.select(selection));
-                respond_to_post(request, selected);
-            }
-            (Method::Post, "/drive") => {
-                let drive = read_json(&mut request).and_then(|drive: Drive| drive.check().map(|()| drive));
-                respond_to_post(request, drive.map(|drive| self.drive.set(drive)));
-            }
-            _ => respond(request, 404, "there is no such page\n"),
+        let done = match (method, path) {
+            (Method::GET, "/feed") => return send_feed(request, &self.feed),
+            (Method::POST, "/select") => read_json(&mut request).and_then(|selection| self.select(selection)),
+            (Method::POST, "/drive") => self.set_drive(&mut request),
+            _ => Err(Refusal::new(StatusCode::NOT_FOUND, "there is no such page\n")),
+        };
+        match done {
+            Ok(()) => request.respond(StatusCode::OK, ""),
+            Err(Refusal { status, reason }) => request.respond(status, &reason),
         }
     }
 
@@ -149,11 +130,22 @@ impl Page {
     ///
     /// # Errors
     /// The script has no such suite or task, or there is no such policy.
-    fn select(&self, selection: Selection) -> Result<(), String> {
+    fn select(&self, selection: Selection) -> Result<(), Refusal> {
         let checked = self.menu.lock().unwrap_or_else(PoisonError::into_inner).check(&selection);
         // The thread that simulates ends with the program only.
         let _ = self.selections.send(selection);
-        checked
+        checked.map_err(bad_request)
+    }
+
+    /// Sets what the page drives the arm by.
+    ///
+    /// # Errors
+    /// It is no such object, or out of range.
+    fn set_drive(&self, request: &mut HttpRequest) -> Result<(), Refusal> {
+        let drive: Drive = read_json(request)?;
+        drive.check().map_err(bad_request)?;
+        self.drive.set(drive);
+        Ok(())
     }
 }
 
@@ -168,35 +160,25 @@ impl Access {
     }
 
     /// True if the request names this server as its host, and as its origin if it has one.
-    fn is_own_page(&self, request: &Request) -> bool {
-        let value = |name: &'static str| {
-            let header = request.headers().iter().find(|header| header.field.equiv(name));
-            header.map(|header| header.value.as_str().to_owned())
+    fn is_own_page(&self, request: &HttpRequest) -> bool {
+        let value = |name: HeaderName| {
+            let header = request.head.headers().get(name);
+            header.map(|header| String::from_utf8_lossy(header.as_bytes()).into_owned())
         };
         let port = self.address.port();
         let own = ["127.0.0.1", "localhost"].map(|name| format!("{name}:{port}"));
         let is_own = |host: &str| own.iter().any(|name| name == host);
         let origin_is_own =
-            value("Origin").is_none_or(|origin| origin.strip_prefix("http://").is_some_and(is_own));
-        origin_is_own && value("Host").is_some_and(|host| is_own(&host))
+            value(header::ORIGIN).is_none_or(|origin| origin.strip_prefix("http://").is_some_and(is_own));
+        origin_is_own && value(header::HOST).is_some_and(|host| is_own(&host))
     }
 }
 
 /// Sends the feed over a websocket until the page closes.
-fn send_feed(request: Request, feed: &Feed) {
-    let key = request.headers().iter().find(|header| header.field.equiv("Sec-WebSocket-Key"));
-    let Some(key) = key.map(|header| header.value.as_str().to_owned()) else {
-        return respond(request, 400, "expected a websocket\n");
-    };
-    let accept = derive_accept_key(key.as_bytes());
-    let response = Response::empty(101)
-        .with_header(header("Upgrade", "websocket"))
-        .with_header(header("Connection", "Upgrade"))
-        .with_header(header("Sec-WebSocket-Accept", &accept));
-    let stream = request.upgrade("websocket", response);
-    let mut socket = WebSocket::from_raw_socket(stream, Role::Server, None);
+fn send_feed(request: HttpRequest, feed: &Feed) {
+    let Some(mut socket) = request.upgrade(MAX_MESSAGE_BYTES) else { return };
     let (mut place, _viewer) = (Place::default(), feed.enter());
-    while !cancel::requested() {
+    loop {
         let message = match feed.next(place) {
             Some((message, next)) => {
                 place = next;
@@ -205,7 +187,8 @@ fn send_feed(request: Request, feed: &Feed) {
             // Shows whether the page is still open.
             None => WebsocketMessage::Ping(Default::default()),
         };
-        if socket.send(message).is_err() {
+        let go_on = || if cancel::requested() { Err(()) } else { Ok(()) };
+        if go_on().and_then(|()| send_frame(&mut socket, message, go_on).map_err(drop)).is_err() {
             return;
         }
     }
@@ -215,36 +198,20 @@ fn send_feed(request: Request, feed: &Feed) {
 ///
 /// # Errors
 /// It is too long, or no such JSON object.
-fn read_json<T: DeserializeOwned>(request: &mut Request) -> Result<T, String> {
-    let mut text = String::new();
-    let read = request.as_reader().take(MAX_REQUEST).read_to_string(&mut text);
-    read.map_err(|error| error.to_string())?;
+fn read_json<T: DeserializeOwned>(request: &mut HttpRequest) -> Result<T, Refusal> {
+    let body = request.read_body()?;
     // A list would be read as the fields in their order.
-    let object: Map<String, Value> = serde_json::from_str(&text).map_err(|error| error.to_string())?;
-    serde_json::from_value(Value::Object(object)).map_err(|error| error.to_string())
+    let object: Map<String, Value> = serde_json::from_slice(&body).map_err(bad_request)?;
+    serde_json::from_value(Value::Object(object)).map_err(bad_request)
 }
 
-fn header(name: &str, value: &str) -> Header {
-    Header::from_bytes(name, value).unwrap_or_else(|()| unreachable!("the headers are ASCII"))
+fn bad_request(problem: impl std::fmt::Display) -> Refusal {
+    Refusal::new(StatusCode::BAD_REQUEST, format!("{problem}\n"))
 }
 
-fn respond(request: Request, status: u16, text: &str) {
-    // The page may have closed.
-    let _ = request.respond(Response::from_string(text).with_status_code(status));
-}
-
-fn respond_to_post(request: Request, done: Result<(), String>) {
-    match done {
-        Ok(()) => respond(request, 200, ""),
-        Err(problem) => respond(request, 400, &format!("{problem}\n")),
-    }
-}
-
-fn respond_with_file(request: Request, file: PageFile) {
+fn respond_with_file(request: HttpRequest, file: PageFile) {
     let policy = "default-src 'self'; img-src 'self' blob: data:; style-src 'self' 'unsafe-inline'";
-    let response = Response::from_data(file.content)
-        .with_header(header("Content-Type", file.kind))
-        .with_header(header("Content-Security-Policy", policy))
-        .with_header(header("Cache-Control", "no-cache"));
-    let _ = request.respond(response);
+    let headers =
+        [("Content-Type", file.kind), ("Content-Security-Policy", policy), ("Cache-Control", "no-cache")];
+    request.respond_with(StatusCode::OK, &headers, file.content);
 }

@@ -32,7 +32,12 @@ impl Drop for Page {
 
 impl Page {
     fn start(project: &Project, words: &str) -> Self {
-        let mut child = Command::new(cargo_bin!("softvt"))
+        Self::start_by(Command::new(cargo_bin!("softvt")), project, words)
+    }
+
+    /// As [`Self::start`], by a command that runs the binary with further words.
+    fn start_by(mut command: Command, project: &Project, words: &str) -> Self {
+        let mut child = command
             .current_dir(project.path(""))
             .arg("watch")
             .args(words.split_whitespace())
@@ -49,12 +54,14 @@ impl Page {
 
     /// The status and the text of the answer to a request.
     fn request(&self, method: &str, target: &str, headers: &str, body: &str) -> (u16, String) {
+        let headers = format!("{headers}Content-Length: {}\r\nConnection: close\r\n", body.len());
+        self.send(&format!("{method} {target} HTTP/1.1\r\n{headers}\r\n{body}"))
+    }
+
+    /// The status and the text of the answer to a request of these bytes.
+    fn send(&self, request: &str) -> (u16, String) {
         let mut stream = TcpStream::connect(&self.address).expect("connected");
-        let length = body.len();
-        let text = format!(
-            "{method} {target} HTTP/1.1\r\n{headers}Content-Length: {length}\r\nConnection: close\r\n\r\n{body}"
-        );
-        stream.write_all(text.as_bytes()).expect("sent");
+        stream.write_all(request.as_bytes()).expect("sent");
         let mut answer = Vec::new();
         stream.read_to_end(&mut answer).expect("an answer");
         let answer = String::from_utf8_lossy(&answer).into_owned();
@@ -203,6 +210,40 @@ fn only_the_own_page_is_answered() {
         assert_eq!(page.post(path, &body).0, 400, "{body}");
     }
     assert_eq!(page.post("/drive", &json!({ "translate": [0, 0, -1], "turn": 0, "close": 0.5 })).0, 200);
+}
+
+#[test]
+fn a_request_of_any_stated_length_leaves_the_page_open() {
+    let project = project();
+    let page = Page::start(&project, "x.lua");
+    let Page { address, token, .. } = &page;
+    let own = format!("/drive?token={token} HTTP/1.1\r\nHost: {address}\r\n");
+    for (head, expected) in [
+        ("/x HTTP/1.1\r\nHost: a\r\nContent-Length: 99999999999999\r\n", 403),
+        (&format!("/x HTTP/1.1\r\nHost: {address}\r\nContent-Length: 99999999999999\r\n"), 401),
+        (&format!("{own}Content-Length: 99999999999999\r\n"), 413),
+        (&format!("{own}Expect: 100-continue\r\nContent-Length: 99999999999\r\n"), 413),
+        (&format!("{own}A: {}\r\n", "b".repeat(1 << 14)), 431),
+    ] {
+        assert_eq!(page.send(&format!("POST {head}\r\n{{}}")).0, expected, "{head:.80}");
+    }
+    assert_eq!(page.post("/drive", &json!({ "translate": [0, 0, -1], "turn": 0, "close": 0.5 })).0, 200);
+}
+
+#[cfg(unix)]
+#[test]
+fn connections_that_say_nothing_do_not_end_the_page() {
+    let project = project();
+    let mut limited = Command::new("sh");
+    limited.args(["-c", "ulimit -n 64; exec \"$0\" \"$@\""]).arg(cargo_bin!("softvt"));
+    let page = Page::start_by(limited, &project, "x.lua");
+    page.feed().until("end");
+    // More than the process has descriptors for. They are closed at the end of the time for a request.
+    let _silent: Vec<TcpStream> =
+        (0..70).map(|_| TcpStream::connect(&page.address).expect("connected")).collect();
+    let own = format!("Host: {}\r\n", page.address);
+    assert_eq!(page.request("GET", "/watch.js", &own, "").0, 200);
+    page.feed().until("end");
 }
 
 #[test]

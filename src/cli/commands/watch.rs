@@ -64,11 +64,11 @@ pub(super) fn run(args: WatchArgs) -> Result<(), CliError> {
         false => script_program(&args)?,
     };
     let watch = Watch::listen(args.port, token()?).map_err(|error| {
-        CliError::input(format!("--port {}: {}; choose another, or 0 for any free port", args.port, error.0))
+        CliError::input(format!("--port {}: {error}; choose another, or 0 for any free port", args.port))
     })?;
     print(&format!("{}\n", watch.url()))?;
     QUIET_INTERRUPT.store(true, Ordering::Relaxed);
-    watch.run(program).map_err(|error| CliError::input(format!("the page has failed: {}", error.0)))?;
+    watch.run(program);
     Err(CliError::interrupted(""))
 }
 
