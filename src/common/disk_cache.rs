@@ -1,9 +1,9 @@
 //! A cache on disk for values that follow from their inputs alone and take long to compute.
 //!
 //! An entry is a file, named after the SHA-256 of what the value was computed from, of this executable and of the
-//! format. An entry therefore never becomes wrong, and several processes and users can share a folder: files are
-//! written under another name and renamed, and their checksum is verified when they are read. Whatever is wrong with
-//! the folder, values are computed.
+//! format. An entry therefore never becomes wrong, and several processes can share a folder: files are written under
+//! another name and renamed, and their checksum, which covers the name, is verified when they are read. Whatever is
+//! wrong with the folder, values are computed. Users who share one trust each other: a checksum is no signature.
 //!
 //! When all are too large, entries that were never read are removed before those that were, as in a segmented LRU cache
 //! (Karedla, Love and Wherry, 1994): a run with hundreds of instances writes many values that no other run needs.
@@ -29,13 +29,15 @@ use sha2::{Digest, Sha256};
 use crate::{parallel::lock, text::hex};
 
 /// Version of the format of the files.
-const FORMAT: u32 = 1;
+const FORMAT: u32 = 2;
 /// First bytes of every file.
-const MAGIC: &[u8; 8] = b"softvt\x00\x01";
+const MAGIC: &[u8; 8] = b"softvt\x00\x02";
 /// Extension of entries.
 const EXTENSION: &str = "softvt";
 /// Extension of files that are being written.
 const PARTIAL: &str = "part";
+/// Largest entry that is written or read, bytes.
+const MAX_ENTRY_BYTES: u64 = 256 << 20;
 /// Values that are computed faster than this are not stored.
 const MIN_TIME: Duration = Duration::from_millis(1);
 /// Interval at which the time of the last use of an entry is updated.
@@ -155,7 +157,7 @@ impl DiskCache {
     /// The stored value of a key. `None` if there is none, or if it is damaged.
     pub fn read<V: DeserializeOwned>(&self, key: &CacheKey) -> Option<V> {
         let folder = self.0.as_ref()?;
-        match read_entry(&folder.path.join(key.file_name())) {
+        match read_entry(&folder.path, &key.file_name()) {
             Ok(content) => postcard::from_bytes(&content?).ok(),
             Err(error) if error.kind() == io::ErrorKind::NotFound => None,
             Err(error) => {
@@ -172,8 +174,8 @@ impl DiskCache {
             return;
         }
         let Ok(content) = postcard::to_allocvec(value) else { return };
-        let size = (MAGIC.len() + checksum(&[]).len() + content.len()) as u64;
-        if size > folder.limit {
+        let size = (MAGIC.len() + Sha256::output_size() + content.len()) as u64;
+        if size > folder.limit.min(MAX_ENTRY_BYTES) {
             return;
         }
         match write_entry(&folder.path, &key.file_name(), &content) {
@@ -243,23 +245,28 @@ fn code_version() -> Option<&'static str> {
     version.as_deref()
 }
 
-fn checksum(content: &[u8]) -> [u8; 32] {
-    Sha256::digest(content).into()
+fn checksum(name: &str, content: &[u8]) -> [u8; 32] {
+    Sha256::new().chain_update(name).chain_update(content).finalize().into()
 }
 
-/// The content of an entry; `None` if it is damaged.
-fn read_entry(path: &Path) -> io::Result<Option<Vec<u8>>> {
+/// The content of an entry; `None` if it is damaged, too large or no regular file.
+fn read_entry(folder: &Path, name: &str) -> io::Result<Option<Vec<u8>>> {
+    let path = folder.join(name);
+    // Before it is opened: a pipe would wait for a writer.
+    let metadata = fs::metadata(&path)?;
+    if !metadata.is_file() || metadata.len() > MAX_ENTRY_BYTES {
+        return Ok(None);
+    }
     let mut file = File::open(path)?;
     let mut bytes = Vec::new();
-    file.read_to_end(&mut bytes)?;
-    let used = file.metadata()?.modified()?;
-    if used.elapsed().is_ok_and(|age| age > USE_INTERVAL) {
+    (&mut file).take(MAX_ENTRY_BYTES).read_to_end(&mut bytes)?;
+    if metadata.modified()?.elapsed().is_ok_and(|age| age > USE_INTERVAL) {
         // Another user's file keeps its time.
         let _ = file.set_modified(SystemTime::now());
     }
     let sound = || {
         let (sum, content) = bytes.strip_prefix(MAGIC)?.split_first_chunk::<32>()?;
-        (*sum == checksum(content)).then(|| content.to_vec())
+        (*sum == checksum(name, content)).then(|| content.to_vec())
     };
     Ok(sound())
 }
@@ -274,7 +281,7 @@ fn write_entry(folder: &Path, name: &str, content: &[u8]) -> io::Result<()> {
     let partial = folder.join(format!("{name}.{:016x}-{number}.{PARTIAL}", *PROCESS));
     let mut file = OpenOptions::new().write(true).create_new(true).open(&partial)?;
     let mut write = || {
-        [MAGIC, &checksum(content)[..], content].iter().try_for_each(|part| file.write_all(part))?;
+        [MAGIC, &checksum(name, content)[..], content].iter().try_for_each(|part| file.write_all(part))?;
         fs::rename(&partial, folder.join(name))
     };
     write().inspect_err(|_| drop(fs::remove_file(&partial)))?;
@@ -418,6 +425,48 @@ mod tests {
             assert_eq!(value(), 42);
             assert_eq!(count.load(Ordering::Relaxed), index + 2);
             assert_eq!(fs::read(only_file(root.path())).unwrap(), sound);
+        }
+    }
+
+    #[test]
+    fn the_content_of_another_entry_is_damaged() {
+        let (root, count) = (tempfile::tempdir().unwrap(), AtomicUsize::new(0));
+        let value = |number| double(&silent(root.path()), number, &count);
+        value(21);
+        let first = only_file(root.path());
+        let content = fs::read(&first).unwrap();
+        fs::remove_file(&first).unwrap();
+        value(4);
+        let second = only_file(root.path());
+        fs::write(&second, &content).unwrap();
+        assert_eq!((value(4), count.load(Ordering::Relaxed)), (8, 3));
+        // Under the name of the other kind.
+        let cache = silent(root.path());
+        let half = cache.key("half", &21_u64).unwrap();
+        fs::write(root.path().join(half.file_name()), &content).unwrap();
+        assert_eq!(cache.read::<u64>(&half), None);
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn pipes_devices_and_files_of_any_length_are_not_read() {
+        let (root, count) = (tempfile::tempdir().unwrap(), AtomicUsize::new(0));
+        let value = || double(&silent(root.path()), 21, &count);
+        value();
+        let path = only_file(root.path());
+        let replacements: [&dyn Fn(); 3] = [
+            &|| {
+                let made = std::process::Command::new("mkfifo").arg(&path).status().unwrap();
+                assert!(made.success());
+            },
+            &|| std::os::unix::fs::symlink("/dev/zero", &path).unwrap(),
+            &|| File::create(&path).unwrap().set_len(20 << 30).unwrap(),
+        ];
+        for (index, replace) in replacements.iter().enumerate() {
+            fs::remove_file(&path).unwrap();
+            replace();
+            assert_eq!((value(), count.load(Ordering::Relaxed)), (42, index + 2));
+            assert!(fs::symlink_metadata(only_file(root.path())).unwrap().is_file(), "it was replaced");
         }
     }
 
