@@ -157,7 +157,7 @@ impl StoredManifest<'_> {
         Ok(RunConfig {
             policy: PolicyConfig::external("replay"),
             tasks: vec![task.to_string()],
-            stored_scripts: StoredScripts::read(self.path)?,
+            stored_scripts: StoredScripts::read(self.path, &self.manifest["sources"])?,
             observer: self.observer.clone(),
             ..RunConfig::of(self.text("script")).with_changes(changes, secret)
         })

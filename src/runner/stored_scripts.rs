@@ -3,24 +3,28 @@
 
 use std::{
     collections::{BTreeMap, BTreeSet},
+    error::Error,
     fs::File,
-    io::{Read, Write},
+    io::{self, Read, Write},
     path::Path,
     sync::Arc,
 };
 
 use serde::{Deserialize, Serialize};
+use serde_json::Value;
 use softvt_common::files::{self, FileError};
-use softvt_report::run_folder::SCRIPTS;
-use softvt_script::{LoadedScript, ScriptFiles};
-use zip::{CompressionMethod, ZipArchive, ZipWriter, result::ZipError, write::SimpleFileOptions};
+use softvt_report::run_folder::{RUN, SCRIPTS};
+use softvt_script::{LoadedScript, ScriptFiles, sha256};
+use zip::{CompressionMethod, ZipArchive, ZipWriter, write::SimpleFileOptions};
 
 use crate::error::RunError;
 
 /// Entry that lists the other entries of the archive.
 const INDEX: &str = "index.json";
-/// Largest file of the archive, bytes.
-const MAX_BYTES: u64 = 64 << 20;
+/// Largest sum of the files of the archive, its index included, bytes.
+const MAX_BYTES: u64 = 256 << 20;
+/// Largest index, bytes.
+const MAX_INDEX_BYTES: u64 = 4 << 20;
 
 /// The scripts and calibrations of a stored run.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -81,7 +85,7 @@ impl StoredScripts {
     }
 
     /// The bytes of the archive, which depend on the files alone.
-    fn archive(&self) -> Result<Vec<u8>, ZipError> {
+    fn archive(&self) -> Result<Vec<u8>, Box<dyn Error>> {
         let mut entries: Vec<(String, &[u8])> = Vec::new();
         let mut add = |kind: &str, (name, bytes): (&String, _)| {
             let file = Path::new(name).file_name().map_or("file".into(), |name| name.to_string_lossy());
@@ -101,8 +105,12 @@ impl StoredScripts {
             refused: self.scripts.refused.clone(),
             hidden: self.scripts.hidden.clone(),
         };
-        let index = serde_json::to_vec_pretty(&index).map_err(std::io::Error::from)?;
-        let mut zip = ZipWriter::new(std::io::Cursor::new(Vec::new()));
+        let index = serde_json::to_vec_pretty(&index)?;
+        let sizes = entries.iter().map(|(_, bytes)| bytes.len() as u64);
+        if sizes.sum::<u64>() + index.len() as u64 > MAX_BYTES || index.len() as u64 > MAX_INDEX_BYTES {
+            return Err(too_large().into());
+        }
+        let mut zip = ZipWriter::new(io::Cursor::new(Vec::new()));
         let options = SimpleFileOptions::default().compression_method(CompressionMethod::Deflated);
         for (name, bytes) in std::iter::once((INDEX.to_owned(), &index[..])).chain(entries) {
             zip.start_file(name, options)?;
@@ -111,24 +119,38 @@ impl StoredScripts {
         Ok(zip.finish()?.into_inner())
     }
 
-    /// Reads the archive of a run folder; `None` if it has none.
+    /// Reads the archive of a run folder; `None` if it has none. `sources` are the SHA-256 of the files by their names,
+    /// as `run.json` states them.
     ///
     /// # Errors
-    /// It is damaged.
-    pub(crate) fn read(folder: &Path) -> Result<Option<Arc<Self>>, RunError> {
+    /// It is damaged or too large, or its files are not those of `run.json`.
+    pub(crate) fn read(folder: &Path, sources: &Value) -> Result<Option<Arc<Self>>, RunError> {
         let path = folder.join(SCRIPTS);
         if !path.is_file() {
             return Ok(None);
         }
         let file = File::open(&path).map_err(FileError::io("read", &path))?;
-        let read = || -> Result<Self, ZipError> {
+        let read = || -> Result<Self, Box<dyn Error>> {
             let mut archive = ZipArchive::new(file)?;
-            let mut entry = |name: &str| -> Result<Vec<u8>, ZipError> {
+            let mut left = MAX_BYTES;
+            let mut entry = |name: &str, limit: u64| -> Result<Vec<u8>, Box<dyn Error>> {
                 let mut bytes = Vec::new();
-                archive.by_name(name)?.take(MAX_BYTES).read_to_end(&mut bytes)?;
+                let limit = limit.min(left);
+                archive.by_name(name)?.take(limit + 1).read_to_end(&mut bytes)?;
+                if bytes.len() as u64 > limit {
+                    return Err(too_large().into());
+                }
+                left -= bytes.len() as u64;
                 Ok(bytes)
             };
-            let index: Index = serde_json::from_slice(&entry(INDEX)?).map_err(std::io::Error::from)?;
+            let index: Index = serde_json::from_slice(&entry(INDEX, MAX_INDEX_BYTES)?)?;
+            let mut file = |name: &str, of: &str| -> Result<Vec<u8>, Box<dyn Error>> {
+                let bytes = entry(of, MAX_BYTES)?;
+                match sources[name] == sha256(&bytes) {
+                    true => Ok(bytes),
+                    false => Err(format!("{name} in it is not that of {RUN}").into()),
+                }
+            };
             let mut scripts = ScriptFiles {
                 served: index.served,
                 absent: index.absent,
@@ -137,11 +159,13 @@ impl StoredScripts {
                 ..ScriptFiles::default()
             };
             for (name, of) in index.files {
-                scripts.files.insert(name, entry(&of)?.into());
+                let bytes = file(&name, &of)?;
+                scripts.files.insert(name, bytes.into());
             }
             let mut calibrations = BTreeMap::new();
-            for (name, of) in index.calibrations {
-                let text = String::from_utf8(entry(&of)?).map_err(std::io::Error::other)?;
+            // Those of scenes that are no episodes of the run are not listed, and not used.
+            for (name, of) in index.calibrations.into_iter().filter(|(name, _)| !sources[name].is_null()) {
+                let text = String::from_utf8(file(&name, &of)?)?;
                 calibrations.insert(name, text);
             }
             Ok(Self { main: index.main, scripts, calibrations })
@@ -154,8 +178,14 @@ impl StoredScripts {
     }
 }
 
+fn too_large() -> String {
+    format!("its files are larger than {} MiB together", MAX_BYTES >> 20)
+}
+
 #[cfg(test)]
 mod tests {
+    use serde_json::json;
+
     use super::*;
 
     #[test]
@@ -173,13 +203,41 @@ mod tests {
         };
         let calibrations = [("assets/calibration/bun.json".to_owned(), "{}".to_owned())].into();
         let stored = StoredScripts { main: "/home/me/a.lua".to_owned(), scripts, calibrations };
+        let mut sources = json!(stored.scripts.hashes());
+        sources["assets/calibration/bun.json"] = sha256(b"{}").into();
         let folder = tempfile::tempdir().unwrap();
-        assert_eq!(StoredScripts::read(folder.path()).unwrap(), None);
+        assert_eq!(StoredScripts::read(folder.path(), &sources).unwrap(), None);
         stored.write(folder.path()).unwrap();
-        assert_eq!(*StoredScripts::read(folder.path()).unwrap().unwrap(), stored);
+        assert_eq!(*StoredScripts::read(folder.path(), &sources).unwrap().unwrap(), stored);
         assert_eq!(stored.archive().unwrap(), stored.archive().unwrap());
+        for name in ["b/a.lua", "assets/calibration/bun.json"] {
+            let mut others = sources.clone();
+            others[name] = sha256(b"easier").into();
+            let error = StoredScripts::read(folder.path(), &others).unwrap_err().to_string();
+            assert!(error.contains(&format!("{name} in it is not that of run.json")), "{error}");
+        }
         std::fs::write(folder.path().join(SCRIPTS), "no archive").unwrap();
-        let error = StoredScripts::read(folder.path()).unwrap_err().to_string();
+        let error = StoredScripts::read(folder.path(), &sources).unwrap_err().to_string();
         assert!(error.contains("scripts.zip") && error.contains("damaged"), "{error}");
+    }
+
+    #[test]
+    fn an_archive_of_many_large_files_is_refused_before_it_fills_the_memory() {
+        let large = vec![0; 60 << 20];
+        let (hash, names) = (sha256(&large), (0..3000).map(|number| number.to_string()));
+        let files: BTreeMap<String, &str> = names.map(|name| (name, "entry")).collect();
+        let sources: BTreeMap<&String, &String> = files.keys().map(|name| (name, &hash)).collect();
+        let index = json!({
+            "main": "0", "files": files, "served": {}, "absent": [], "refused": {}, "hidden": [], "calibrations": {},
+        });
+        let folder = tempfile::tempdir().unwrap();
+        let mut zip = ZipWriter::new(File::create(folder.path().join(SCRIPTS)).unwrap());
+        for (name, content) in [(INDEX, index.to_string().as_bytes()), ("entry", &large)] {
+            zip.start_file(name, SimpleFileOptions::default()).unwrap();
+            zip.write_all(content).unwrap();
+        }
+        zip.finish().unwrap();
+        let error = StoredScripts::read(folder.path(), &json!(sources)).unwrap_err().to_string();
+        assert!(error.contains("larger than 256 MiB together"), "{error}");
     }
 }
