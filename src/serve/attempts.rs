@@ -4,7 +4,11 @@
 //! executes the first action of the episode on this server counts, and only if it steps the episode from its reset to
 //! its end. Until then no other client can step the episode, so that none tries out actions for it.
 
-use std::{collections::BTreeMap, fmt, sync::Mutex};
+use std::{
+    collections::BTreeMap,
+    fmt,
+    sync::{Mutex, MutexGuard},
+};
 
 use super::config::{EpisodeRecorder, RequestError};
 use softvt_common::episode_id::EpisodeId;
@@ -54,26 +58,52 @@ impl<'a> Attempts<'a> {
     /// Checks that no client but that of the attempt `own` has begun an attempt at the episode that is not over.
     ///
     /// # Errors
-    /// Another client has.
-    pub(super) fn check_free(&self, id: &EpisodeId, own: Option<&Attempt<'_>>) -> Result<(), RequestError> {
+    /// Another client has; the message begins with the type of the `request`.
+    pub(super) fn check_free(
+        &self,
+        request: &str,
+        id: &EpisodeId,
+        own: Option<&Attempt<'_>>,
+    ) -> Result<(), RequestError> {
+        self.lock_free(request, id, own).map(drop)
+    }
+
+    fn lock_free(
+        &self,
+        request: &str,
+        id: &EpisodeId,
+        own: Option<&Attempt<'_>>,
+    ) -> Result<MutexGuard<'_, BTreeMap<EpisodeId, AttemptState>>, RequestError> {
         let is_own = own.is_some_and(|attempt| attempt.id == *id);
-        match lock(&self.states).get(id) {
+        let states = lock(&self.states);
+        match states.get(id) {
             Some(AttemptState::InProgress) if !is_own => Err(format!(
-                "step: task {}, episode {} is being recorded for another client; step it when that client is done, or \
-                 another episode",
+                "{request}: task {}, episode {} is being recorded for another client; use it when that client is done, \
+                 or another episode",
                 id.task, id.episode
             )
             .into()),
-            _ => Ok(()),
+            _ => Ok(states),
         }
     }
 
-    /// Ends the attempt at an episode, also one that another client has begun, or rules out a later one.
-    pub(super) fn exclude(&self, id: &EpisodeId, reason: &str) {
-        let Some(recorder) = self.recorder.filter(|recorder| (recorder.selects)(id)) else { return };
-        if self.end(id) != Some(AttemptState::Over) {
+    /// Ends the client's `own` attempt at an episode, or rules out a later one of any client.
+    ///
+    /// # Errors
+    /// As [`Self::check_free`].
+    pub(super) fn exclude(
+        &self,
+        request: &str,
+        id: &EpisodeId,
+        own: Option<&Attempt<'_>>,
+        reason: &str,
+    ) -> Result<(), RequestError> {
+        let Some(recorder) = self.recorder.filter(|recorder| (recorder.selects)(id)) else { return Ok(()) };
+        let before = self.lock_free(request, id, own)?.insert(id.clone(), AttemptState::Over);
+        if before != Some(AttemptState::Over) {
             (recorder.report_lost)(id, reason);
         }
+        Ok(())
     }
 
     /// Ends the attempt at an episode, and returns its state before.
@@ -151,18 +181,18 @@ mod tests {
     #[test]
     fn no_other_client_steps_an_episode_during_an_attempt() {
         let lost = reports(|attempts| {
-            assert!(attempts.check_free(&id(0), None).is_ok(), "before the attempt");
+            assert!(attempts.check_free("step", &id(0), None).is_ok(), "before the attempt");
             let first = attempts.begin(&id(0));
-            assert!(attempts.check_free(&id(0), first.as_ref()).is_ok(), "its own client");
-            assert!(attempts.check_free(&id(0), None).is_err(), "another client");
+            assert!(attempts.check_free("step", &id(0), first.as_ref()).is_ok(), "its own client");
+            assert!(attempts.check_free("step", &id(0), None).is_err(), "another client");
             let other = attempts.begin(&id(1));
             assert!(
-                attempts.check_free(&id(0), other.as_ref()).is_err(),
+                attempts.check_free("step", &id(0), other.as_ref()).is_err(),
                 "a client with an attempt at another episode"
             );
-            assert!(attempts.check_free(&id(2), None).is_ok(), "another episode");
+            assert!(attempts.check_free("step", &id(2), None).is_ok(), "another episode");
             drop(first);
-            assert!(attempts.check_free(&id(0), None).is_ok(), "after the attempt");
+            assert!(attempts.check_free("step", &id(0), None).is_ok(), "after the attempt");
         });
         assert_eq!(lost.len(), 2);
     }
@@ -171,8 +201,11 @@ mod tests {
     fn an_episode_that_was_reached_by_a_state_is_not_recorded() {
         let lost = reports(|attempts| {
             let first = attempts.begin(&id(0));
+            let exclude = |episode, own| attempts.exclude("set_state", &id(episode), own, "restored");
+            let error = exclude(0, None).expect_err("another client").to_string();
+            assert!(error.starts_with("set_state: task 0, episode 0 is being recorded"), "{error}");
             for episode in [0, 0, 1, 10] {
-                attempts.exclude(&id(episode), "restored");
+                assert!(exclude(episode, first.as_ref()).is_ok());
             }
             drop(first);
             assert!(attempts.begin(&id(1)).is_none());

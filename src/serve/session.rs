@@ -83,7 +83,8 @@ impl<'a> ClientSession<'a> {
     /// Brings the episode to a state: from the nearest copy that leads to it, or from the start of the episode.
     fn go_to(&mut self, state: &EpisodeState) -> Result<(), RequestError> {
         if !state.actions.is_empty() {
-            self.attempts.exclude(&state.id, "a client restored a state of it");
+            let reason = "a client restored a state of it";
+            self.attempts.exclude("set_state", &state.id, self.attempt.as_ref(), reason)?;
         }
         let copies = self.snapshots.iter().chain(&self.live);
         let candidates = copies.filter_map(|copy| Some((copy.state.steps_to(state)?, copy)));
@@ -129,7 +130,7 @@ impl<'a> ClientSession<'a> {
             let config = self.config;
             let (attempts, own) = (self.attempts, self.attempt.take());
             let live = self.live("step")?;
-            let is_free = attempts.check_free(&live.state.id, own.as_ref());
+            let is_free = attempts.check_free("step", &live.state.id, own.as_ref());
             self.attempt = own;
             is_free?;
             let live = self.live("step")?;
