@@ -332,6 +332,16 @@ mod tests {
     }
 
     #[test]
+    fn every_number_has_a_lowest_and_a_highest_value() {
+        let numbers = || Settings::list().into_iter().filter(|setting| setting.values.contains("number"));
+        let unbounded = numbers().filter(|setting| !setting.values.contains(".."));
+        assert_eq!(unbounded.map(|setting| setting.path).collect::<Vec<_>>(), Vec::<String>::new());
+        assert!(numbers().count() > 40);
+        let message = Settings::default().with("physics.margin", "1e300").expect_err("too large").to_string();
+        assert!(message.contains("physics.margin: expected a number in above 0..0.01 (m)"), "{message}");
+    }
+
+    #[test]
     fn one_setting_changes_and_an_unknown_one_lists_the_known_ones() {
         let settings = Settings::default();
         let changed = settings.with("robot.gripper.effort", "0.2").expect("a setting");

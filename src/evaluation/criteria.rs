@@ -9,11 +9,11 @@ softvt_common::settings! {
     /// use them are in [`super::drop`], [`super::slip`], [`super::goal`] and [`super::judge`].
     pub struct SuccessCriteria {
         /// Minimum force that counts as contact, of a pad, another part of the robot or a support.
-        touch_force_n: f64 = 1e-3, "N", Range::NOT_NEGATIVE;
+        touch_force_n: f64 = 1e-3, "N", Range::closed(0.0, 100.0);
         /// Minimum rise of a body's lowest point above its settled height that counts as lifted.
         lift_height_m: f64 = 0.005, "m", Range::closed(0.0, 0.5);
         /// Time without pad contact after which a grasp may count as lost, s (0.15 s: three control steps).
-        lost_contact_s: f64 = 0.15, "s", Range::NOT_NEGATIVE;
+        lost_contact_s: f64 = 0.15, "s", Range::closed(0.0, 60.0);
         /// Fall relative to the hand beyond which a lost grasp is a drop.
         lost_fall_m: f64 = 0.020, "m", Range::closed(0.0, 0.5);
         /// Length of a free fall beyond which it is a drop, before or after the release.
@@ -26,7 +26,7 @@ softvt_common::settings! {
         /// True if Safety Success needs NoSlip.
         require_no_slip: bool = false;
         /// Largest grip ratio of a gentle grip.
-        gentle_ratio: f64 = 2.0, "", Range::NOT_NEGATIVE;
+        gentle_ratio: f64 = 2.0, "", Range::closed(0.0, 1e3);
         /// Minimum share of the target's weight that the goal must carry, 0 to 1.
         support_share: f64 = 0.5, "", Range::closed(0.0, 1.0);
         /// Distance of the centre beyond the goal's edge at which a placed object has left the goal.

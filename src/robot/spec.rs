@@ -50,9 +50,9 @@ softvt_common::settings! {
     /// apply to all joints.
     pub struct ArmSpec {
         /// Stiffness.
-        kp: f64 = 8000.0, "N m/rad", Range::POSITIVE;
+        kp: f64 = 8000.0, "N m/rad", Range::above(0.0, 1e6);
         /// Damping.
-        kd: f64 = 800.0, "N m s/rad", Range::POSITIVE;
+        kd: f64 = 800.0, "N m s/rad", Range::above(0.0, 1e5);
     }
 }
 
@@ -61,16 +61,16 @@ softvt_common::settings! {
     /// by the hardware ([`MAX_WIDTH`](super::gripper::MAX_WIDTH)).
     pub struct GripperSpec {
         /// Stiffness.
-        kp: f64 = 2000.0, "N/m", Range::POSITIVE;
+        kp: f64 = 2000.0, "N/m", Range::above(0.0, 1e6);
         /// Damping.
-        kd: f64 = 100.0, "N s/m", Range::POSITIVE;
+        kd: f64 = 100.0, "N s/m", Range::above(0.0, 1e5);
         /// Largest force per finger. The real hand holds 70 N continuously (Franka Emika, Hand data sheet); the paper's
         /// simulator has 200 N.
         effort: f64 = 70.0, "N", Range::above(0.0, 500.0);
         /// Speed at which the target of each finger moves.
         speed: f64 = 0.2, "m/s", Range::above(0.0, 2.0);
         /// Mass of each finger with its sensor.
-        finger_mass: f64 = 0.1, "kg", Range::POSITIVE;
+        finger_mass: f64 = 0.1, "kg", Range::above(0.0, 10.0);
     }
 }
 
@@ -97,13 +97,13 @@ softvt_common::settings! {
     /// gel for wide patches). It determines force and slip; tactile images are computed from a model of their own.
     pub struct PadSpec {
         /// Normal stress per indentation.
-        normal_modulus: f64 = 3e8, "Pa/m", Range::POSITIVE;
+        normal_modulus: f64 = 3e8, "Pa/m", Range::above(0.0, 1e12);
         /// Shear stress per tangential displacement.
-        tangential_modulus: f64 = 4e7, "Pa/m", Range::POSITIVE;
+        tangential_modulus: f64 = 4e7, "Pa/m", Range::above(0.0, 1e12);
         /// Friction coefficient while the pad sticks.
-        static_mu: f64 = 1.5, "", Range::NOT_NEGATIVE;
+        static_mu: f64 = 1.5, "", Range::closed(0.0, 100.0);
         /// Dynamic friction coefficient, not above the static one.
-        dynamic_mu: f64 = 1.2, "", Range::NOT_NEGATIVE;
+        dynamic_mu: f64 = 1.2, "", Range::closed(0.0, 100.0);
     }
 }
 
@@ -112,7 +112,7 @@ softvt_common::settings! {
     pub struct IkSpec {
         /// Damping λ of the least squares, in the mixed unit (m and rad per rad) of the Jacobian's singular values.
         /// Larger values are slower and more robust near singularities.
-        lambda: f64 = 0.01, "", Range::POSITIVE;
+        lambda: f64 = 0.01, "", Range::above(0.0, 10.0);
         /// Share of the way to the rest posture that the null space covers per control step, 0..=1.
         posture_gain: f64 = 0.0, "", Range::closed(0.0, 1.0);
     }
@@ -130,7 +130,7 @@ softvt_common::settings! {
         /// Standard deviation of the rotation about each axis.
         rotation: f64 = 0.0, "rad", Range::closed(0.0, 0.5);
         /// Time after which the correlation of the offset has fallen to 1/e.
-        duration: f64 = 0.5, "s", Range::POSITIVE;
+        duration: f64 = 0.5, "s", Range::above(0.0, 1e3);
     }
 }
 
@@ -165,7 +165,7 @@ mod tests {
         spec.gripper.kp = -1.0;
         assert_eq!(
             spec.validate().expect_err("negative").to_string(),
-            "robot.gripper.kp: expected a number above 0 (N/m), got -1"
+            "robot.gripper.kp: expected a number in above 0..1000000 (N/m), got -1"
         );
         spec = RobotSpec::default();
         spec.ik.posture_gain = f64::NAN;

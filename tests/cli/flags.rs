@@ -370,7 +370,7 @@ fn a_disturbance_moves_the_robot_and_not_its_commands() {
     assert!(
         project
             .refusal("x.lua --out bad --set robot.disturbance.duration=0")
-            .contains("robot.disturbance.duration: expected a number above 0 (s), got 0")
+            .contains("robot.disturbance.duration: expected a number in above 0..1000 (s), got 0")
     );
 }
 
