@@ -14,6 +14,7 @@ use clap::{Args, ValueEnum, value_parser};
 
 use crate::{error::CliError, output::Console, plan_flags};
 use softvt_benchmark::{ShiftValue, Suite, Task, Teacher};
+use softvt_common::text::is_control;
 use softvt_dataset::{OptionalStream, card::KeptOutcome};
 use softvt_policy::{profile::GripCode, remote::ServerProtocol};
 use softvt_records::requirement::Requirement;
@@ -452,7 +453,7 @@ fn parse_timeout(word: &str) -> Result<Duration, String> {
 }
 
 fn parse_name(word: &str) -> Result<String, String> {
-    let is_valid = !word.trim().is_empty() && word.len() <= 80 && !word.chars().any(char::is_control);
+    let is_valid = !word.trim().is_empty() && word.len() <= 80 && !word.chars().any(is_control);
     if is_valid { Ok(word.to_owned()) } else { Err("expected a name of 1 to 80 characters".to_owned()) }
 }
 /// The only task that the configuration selects.

@@ -36,15 +36,31 @@ pub fn significant(x: f64, digits: usize) -> String {
     exact_number(if rounded.is_finite() { rounded } else { x })
 }
 
+/// True for control characters, also those that change the direction of a text (Unicode's property `Bidi_Control`).
+pub fn is_control(c: char) -> bool {
+    c.is_control()
+        || matches!(c, '\u{61c}' | '\u{200e}' | '\u{200f}' | '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
+}
+
 /// Escapes control characters other than newlines and tabs, so that untrusted text cannot control a terminal.
 pub fn escape_control(text: &str) -> Cow<'_, str> {
-    let harmful = |c: char| c.is_control() && c != '\n' && c != '\t';
+    let harmful = |c: char| is_control(c) && c != '\n' && c != '\t';
     if !text.contains(harmful) {
         return Cow::Borrowed(text);
     }
     let escaped =
         text.chars().map(|c| if harmful(c) { c.escape_default().to_string() } else { c.to_string() });
     Cow::Owned(escaped.collect())
+}
+
+/// A text as a field of a CSV file: in quotation marks where it has to be (RFC 4180, one rule), and after an apostrophe
+/// where a spreadsheet would take it for a formula.
+pub fn csv_field(text: &str) -> String {
+    let apostrophe = if text.starts_with(['=', '+', '-', '@', '\t', '\r']) { "'" } else { "" };
+    match text.contains([',', '"', '\n', '\r']) {
+        true => format!("\"{apostrophe}{}\"", text.replace('"', "\"\"")),
+        false => format!("{apostrophe}{text}"),
+    }
 }
 
 /// Writes a line to standard error. Ignores write errors, so that a closed pipe does not end a run.
@@ -261,7 +277,16 @@ mod tests {
     #[test]
     fn control_characters_are_shown() {
         assert_eq!(escape_control("a\u{1b}[2J\rb\tc\nd"), "a\\u{1b}[2J\\rb\tc\nd");
+        assert_eq!(escape_control("a\u{202e}b"), "a\\u{202e}b");
         assert!(matches!(escape_control("µ = 0.5"), Cow::Borrowed(_)));
+    }
+
+    #[test]
+    fn a_field_of_a_table_is_no_formula() {
+        let fields = ["a", "a,\"b\"", "=cmd|' /C calc'!A0", "+1", "-1", "@x", "=\"a\"", ""].map(csv_field);
+        let expected =
+            ["a", "\"a,\"\"b\"\"\"", "'=cmd|' /C calc'!A0", "'+1", "'-1", "'@x", "\"'=\"\"a\"\"\"", ""];
+        assert_eq!(fields, expected);
     }
 
     #[test]

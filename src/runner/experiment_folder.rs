@@ -1,7 +1,5 @@
 //! The folder of an experiment: `run.json`, and `points.jsonl` with the parameters and the rows of each finished point,
 //! from which an interrupted experiment continues; at the end `rows.jsonl` and `rows.csv`, and the files of the script.
-//!
-//! The fields of CSV are quoted by hand (RFC 4180 has one rule): a crate would be larger than the function.
 
 use std::{
     collections::{BTreeMap, BTreeSet},
@@ -15,6 +13,7 @@ use crate::{error::RunError, run_manifest};
 use softvt_common::{
     files::{self, json_lines, replace},
     journal::{Journal, whole_lines},
+    text::csv_field,
 };
 use softvt_report::run_folder::{RUN, RunFolder, of_folder};
 use softvt_script::ExperimentRow;
@@ -134,7 +133,7 @@ fn csv(points: &[FinishedPoint], columns: &[String]) -> String {
     let others = of_rows.iter().copied().filter(|name| !named.contains(name));
     let names: Vec<&String> = parameters.iter().copied().chain(named.iter().copied()).chain(others).collect();
     let line = |fields: Vec<String>| fields.join(",") + "\n";
-    let mut text = line(names.iter().map(|name| quoted((*name).clone())).collect());
+    let mut text = line(names.iter().map(|name| csv_field(name)).collect());
     for point in points {
         for row in &point.rows {
             let value = |name: &&String| {
@@ -146,20 +145,13 @@ fn csv(points: &[FinishedPoint], columns: &[String]) -> String {
     text
 }
 
-/// A value as a field: text as it is, nothing for null, and lists and tables as JSON.
+/// A value as a field: text and numbers as they are, nothing for null, and lists and tables as JSON.
 fn field(value: Option<&Value>) -> String {
     match value {
         None | Some(Value::Null) => String::new(),
-        Some(Value::String(text)) => quoted(text.clone()),
-        Some(other) => quoted(other.to_string()),
-    }
-}
-
-/// A field in quotation marks where it has to be.
-fn quoted(text: String) -> String {
-    match text.contains([',', '"', '\n', '\r']) {
-        true => format!("\"{}\"", text.replace('"', "\"\"")),
-        false => text,
+        Some(Value::String(text)) => csv_field(text),
+        Some(Value::Number(number)) => number.to_string(),
+        Some(other) => csv_field(&other.to_string()),
     }
 }
 
@@ -186,6 +178,8 @@ mod tests {
         ];
         let text = "gap,d,kind,list,note\n42,0.5,\"a, b\",,\n48,1.5,,,\"5 \"\"mm\"\"\"\n48,,,\"[1,2]\",\n";
         assert_eq!(csv(&points, &[]), text);
+        let formula = [point(0, json!({}), json!([{ "=1": "=cmd|' /C calc'!A0", "change": -0.5 }]))];
+        assert_eq!(csv(&formula, &[]), "'=1,change\n'=cmd|' /C calc'!A0,-0.5\n");
         let ordered = csv(&points, &["note".to_owned(), "absent".to_owned(), "d".to_owned()]);
         assert!(ordered.starts_with("gap,note,d,kind,list\n"), "{ordered}");
     }

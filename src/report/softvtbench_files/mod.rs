@@ -14,6 +14,7 @@ use serde_json::{Value, json};
 
 use softvt_common::episode_id::{EpisodeId, EpisodeIndex};
 use softvt_common::files::{self, FileError, replace};
+use softvt_common::text::csv_field;
 use softvt_evaluation::{
     deformation::{ReferenceShape, V1_METRIC_ID},
     statistics::{Rate, quantile},
@@ -220,14 +221,14 @@ fn episodes_csv(episodes: &[ScoredEpisode<'_>]) -> String {
             "jsonl,{},{},{},{},{},{},{},{},{},{}\r\n",
             header.id.task,
             header.id.episode,
-            quote_csv(&header.asset),
+            csv_field(&header.asset),
             truth(Some(episode.record.verdict.goal)),
             number(episode.peak_pct()),
             number(episode.tau),
             truth(episode.deform_ok()),
             truth(episode.safe_success()),
             episode.record.stats.steps.max(1),
-            quote_csv(&episode.missing_evidence()),
+            csv_field(&episode.missing_evidence()),
         );
     }
     out
@@ -288,15 +289,6 @@ fn in_order(records: &[EpisodeRecord]) -> Vec<&EpisodeRecord> {
 fn round_to(value: f64, digits: i32) -> f64 {
     let scale = 10.0_f64.powi(digits);
     (value * scale).round() / scale
-}
-
-/// Quotes a CSV field where necessary (RFC 4180).
-fn quote_csv(field: &str) -> String {
-    if field.contains([',', '"', '\n', '\r']) {
-        format!("\"{}\"", field.replace('"', "\"\""))
-    } else {
-        field.to_owned()
-    }
 }
 
 #[cfg(test)]

@@ -36,7 +36,6 @@ fn episodes_csv_has_softvtbenchs_columns_and_line_ends() {
         jsonl,1,0,roll,True,1.250000,1.000000,False,False,168,\r\n\
         jsonl,2,0,cake,True,0.300000,,,,168,missing_tau:cake\r\n";
     assert_eq!(episodes_csv(&scored(&records())), expected);
-    assert_eq!(quote_csv("a,\"b\""), "\"a,\"\"b\"\"\"");
 }
 
 #[test]

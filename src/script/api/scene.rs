@@ -18,7 +18,11 @@ use crate::{
     schema::{Constructed, Range, Type, class, object::fixed_list, record},
     vm::error::{author_line, fail},
 };
-use softvt_common::{parallel::lock, range::RangeError, text::format_number};
+use softvt_common::{
+    parallel::lock,
+    range::RangeError,
+    text::{format_number, is_control},
+};
 use softvt_geometry::{Aabb, Pose, Quat, Vec3};
 use softvt_physics::{STANDARD_GRAVITY, contact::Friction, fem::ElasticMaterial};
 use softvt_robot::panda::{self, ARM_DOFS};
@@ -147,7 +151,7 @@ impl LuaScene {
         if prompt.trim().is_empty() {
             return Err(fail(lua, "scene.prompt: expected an instruction, got an empty text"));
         }
-        if prompt.contains(char::is_control) {
+        if prompt.contains(is_control) {
             return Err(fail(lua, format!("scene.prompt: expected one line of text, got {prompt:?}")));
         }
         lock(task).prompt = prompt;

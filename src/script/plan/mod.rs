@@ -42,7 +42,7 @@ use softvt_benchmark::{
 };
 use softvt_common::{
     parallel::lock,
-    text::{exact_number, unknown_name},
+    text::{exact_number, is_control, unknown_name},
 };
 
 /// Kind of the main file of a script.
@@ -521,7 +521,7 @@ fn task(lua: &Lua, id: usize, spec: &Constructed<TaskSpec>, budget: u32) -> mlua
             return Err(fail_at_key(lua, table, "range", message));
         }
     }
-    if spec.prompt.contains(char::is_control) || spec.prompt.trim().is_empty() {
+    if spec.prompt.contains(is_control) || spec.prompt.trim().is_empty() {
         let message = format!("task.prompt: expected one line of text, got {:?}", spec.prompt);
         return Err(fail_at_key(lua, &spec.table, "prompt", message));
     }

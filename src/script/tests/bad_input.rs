@@ -277,10 +277,16 @@ fn an_unknown_field_of_a_standard_module_is_an_error_of_the_script() {
 
 #[test]
 fn a_prompt_of_several_lines_is_refused() {
-    let script = SUITE.replacen("prompt = ", "prompt = 'a\\n' .. ", 1);
-    assert_ne!(script, SUITE);
-    let message = error_of(&format!("{script}return suite()"));
-    assert!(message.contains("task.prompt: expected one line of text, got \"a\\n"), "{message}");
+    // A character that reverses what follows hides it as well.
+    for (written, shown) in [("\\n", "\\n"), ("\\u{202E}", "\\u{202e}")] {
+        let script = SUITE.replacen("prompt = ", &format!("prompt = 'a{written}' .. "), 1);
+        assert_ne!(script, SUITE);
+        let message = error_of(&format!("{script}return suite()"));
+        assert!(
+            message.contains(&format!("task.prompt: expected one line of text, got \"a{shown}")),
+            "{message}"
+        );
+    }
 }
 
 #[test]
