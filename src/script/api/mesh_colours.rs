@@ -1,8 +1,12 @@
 //! Colours of mesh files: their materials and images, as colours of a shape.
 
-use std::{collections::BTreeMap, io::Cursor, sync::Arc};
+use std::{
+    collections::BTreeMap,
+    io::{self, Cursor},
+    sync::Arc,
+};
 
-use image::{ImageReader, imageops::FilterType};
+use image::{ImageReader, Limits, imageops::FilterType};
 use mlua::Lua;
 
 use crate::vm::memory_budget::{Reservation, reserve};
@@ -124,6 +128,18 @@ pub(crate) fn path_beside(mesh_file: &str, name: &str) -> Result<String, String>
 /// scaled down.
 const KEPT_EDGE: u32 = 2048;
 
+/// Memory for what an image has beside its pixels, bytes. A larger colour profile is ignored.
+const MAX_METADATA_BYTES: u64 = 8 << 20;
+
+/// A reader of an image of up to so many pixels, of 8 bytes at most.
+fn reader(bytes: &[u8], pixels: u64) -> io::Result<ImageReader<Cursor<&[u8]>>> {
+    let mut reader = ImageReader::new(Cursor::new(bytes)).with_guessed_format()?;
+    let mut limits = Limits::default();
+    limits.max_alloc = Some(8 * pixels + MAX_METADATA_BYTES);
+    reader.limits(limits);
+    Ok(reader)
+}
+
 /// The images of a mesh file, each decoded once.
 struct Images<'a> {
     lua: &'a Lua,
@@ -152,11 +168,8 @@ impl<'a> Images<'a> {
 
     fn decode(&mut self, name: &str, bytes: &[u8]) -> Result<SurfaceImage, String> {
         let unreadable = |error: &dyn std::fmt::Display| format!("{name}: {error}; give a PNG or JPEG file");
-        let reader = || {
-            let reader = ImageReader::new(Cursor::new(bytes)).with_guessed_format();
-            reader.map_err(|error| unreadable(&error))
-        };
-        let (width, height) = reader()?.into_dimensions().map_err(|error| unreadable(&error))?;
+        let reader = |pixels: u64| reader(bytes, pixels).map_err(|error| unreadable(&error));
+        let (width, height) = reader(0)?.into_dimensions().map_err(|error| unreadable(&error))?;
         let most = SurfaceImage::MAX_EDGE;
         if width > most || height > most {
             return Err(format!(
@@ -174,7 +187,8 @@ impl<'a> Images<'a> {
                  down or use fewer images"
             )
         })?);
-        let decoded = reader()?.decode().map_err(|error| unreadable(&error))?;
+        let decoded =
+            reader(u64::from(width) * u64::from(height))?.decode().map_err(|error| unreadable(&error))?;
         let kept = match longest > KEPT_EDGE {
             true => decoded.resize(KEPT_EDGE, KEPT_EDGE, FilterType::Triangle),
             false => decoded,
@@ -188,7 +202,9 @@ impl<'a> Images<'a> {
 mod tests {
     use std::cell::RefCell;
 
-    use image::{ImageFormat, RgbImage};
+    use image::{
+        ExtendedColorType, ImageDecoder, ImageEncoder, ImageFormat, RgbImage, codecs::png::PngEncoder,
+    };
 
     use super::*;
     use crate::vm::memory_budget::MemoryUse;
@@ -220,6 +236,19 @@ mod tests {
         let lua = Lua::new();
         lua.set_app_data(MemoryUse::default());
         lua
+    }
+
+    #[test]
+    fn a_colour_profile_is_unpacked_within_a_limit() {
+        let profile = |size: usize| {
+            let mut png = Vec::new();
+            let mut encoder = PngEncoder::new(&mut png);
+            encoder.set_icc_profile(vec![0; size]).expect("PNG has profiles");
+            encoder.write_image(&[0; 12], 2, 2, ExtendedColorType::Rgb8).expect("a PNG file");
+            let mut decoder = reader(&png, 4).expect("PNG").into_decoder().expect("a decoder");
+            decoder.icc_profile().expect("read").map(|profile| profile.len())
+        };
+        assert_eq!([1000, 64 << 20].map(profile), [Some(1000), None]);
     }
 
     #[test]

@@ -221,7 +221,7 @@ fn errors_of_every_kind_end_in_a_line_of_text() {
             "x.lua:2: C stack overflow",
         ),
         ("local f f = function(s) return s:gsub('.', f) end f('x')", "x.lua:2: C stack overflow"),
-        ("return load(('('):rep(1e5))", "x.lua:2: C stack overflow"),
+        ("local _, m = load(('('):rep(1e5)) error('<' .. m .. '>')", "x.lua:2: <C stack overflow>"),
         (
             "local t = setmetatable({}, {}) getmetatable(t).__index = t return { a = t.x }",
             "x.lua:2: '__index' chain too long; possible loop",

@@ -371,6 +371,8 @@ fn load(
     match chunk.into_function() {
         Ok(function) => Ok((Some(function), None)),
         Err(mlua::Error::SyntaxError { message, .. }) => Ok((None, Some(message))),
+        // Of the parser, at too deep nesting; with a traceback.
+        Err(mlua::Error::RuntimeError(text)) => Ok((None, text.lines().next().map(str::to_owned))),
         Err(other) => Err(other),
     }
 }
