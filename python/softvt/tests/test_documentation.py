@@ -1,6 +1,7 @@
-"""The Python code of docs/python.md and of the README."""
+"""The Python code of docs/python.md and of the README, and the versions of the packages."""
 
 import re
+import tomllib
 import unittest
 from pathlib import Path
 from unittest import mock
@@ -32,6 +33,15 @@ class Documentation(unittest.TestCase):
                             names.pop(name).close()
         self.assertEqual((names["observation"]["proprio"].shape, names["image"].shape), ((7,), (224, 224, 3)))
         self.assertEqual(names["item"]["actions"].shape, (50, 7))
+
+    def test_all_packages_have_the_version_of_the_program(self):
+        program = tomllib.loads((ROOT / "Cargo.toml").read_text(encoding="utf-8"))["workspace"]["package"]["version"]
+        for package in ("lerobot_env_softvt", "baselines"):
+            project = tomllib.loads((ROOT / f"python/{package}/pyproject.toml").read_text(encoding="utf-8"))["project"]
+            self.assertEqual(project["version"], program, package)
+            for name, version in re.findall(r"(softvt[\w-]*)==([\d.]+)", " ".join(project["dependencies"])):
+                self.assertEqual(version, program, f"{package} asks for {name}")
+        self.assertIn(f"\nversion: {program}\n", (ROOT / "CITATION.cff").read_text(encoding="utf-8"))
 
 
 if __name__ == "__main__":
