@@ -180,13 +180,13 @@ impl PolicyConnection {
         transport::send(&mut self.socket, value, on_wait).map_err(|error| server.transport_error(error))
     }
 
-    /// Receives the next message until `deadline`.
+    /// Receives the next message until `deadline`. `what` says what the server did not do, such as "did not answer".
     ///
     /// # Errors
     /// The connection fails, or the server sends text (its error message), an invalid message, or nothing in time.
-    pub(super) fn receive(&mut self, deadline: Instant) -> Result<Value, PolicyError> {
+    pub(super) fn receive(&mut self, deadline: Instant, what: &str) -> Result<Value, PolicyError> {
         loop {
-            match self.receive_frame(deadline, "did not answer")? {
+            match self.receive_frame(deadline, what)? {
                 Message::Binary(bytes) => {
                     return unpack(&bytes).map_err(|error| self.server.error(&format!("sent {error}")));
                 }

@@ -166,7 +166,7 @@ fn step_of(observation: &Observation) -> u32 {
 
 /// openpi's protocol: receives the metadata that the server sends first.
 fn greet_openpi(connection: &mut PolicyConnection, deadline: Instant) -> Result<(), PolicyError> {
-    let metadata = connection.receive(deadline)?;
+    let metadata = connection.receive(deadline, "did not send its first message, the metadata,")?;
     if metadata.as_map().is_none() {
         let what = format!("sent {} first; openpi servers send a map of metadata", kind(&metadata));
         return Err(connection.server.error(&what));
@@ -320,7 +320,7 @@ fn ask_openpi(
 ) -> Result<Value, PolicyError> {
     let deadline = connection.server.deadline();
     connection.send(&encode::openpi(observation, &connection.server.profile, query), deadline)?;
-    let response = connection.receive(deadline)?;
+    let response = connection.receive(deadline, "did not answer")?;
     connection.check_silence(deadline)?;
     Ok(response)
 }

@@ -248,7 +248,7 @@ fn the_timeout_holds_while_bytes_arrive() {
         (pings(Duration::from_millis(10)), "did not answer within 1 s"),
         (pings(Duration::ZERO), "did not answer within 1 s"),
         (reply, "did not answer within 1 s"),
-        (greeting, "did not answer within 1 s"),
+        (greeting, "did not send its first message, the metadata, within 1 s"),
         (handshake, "tried for 1 s"),
         (no_pong, "did not answer a ping within 1 s"),
     ] {

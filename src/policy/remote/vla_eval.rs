@@ -26,7 +26,7 @@ pub(super) fn greet(connection: &mut PolicyConnection, deadline: Instant) -> Res
         ("benchmark", Value::from("softvt")),
     ]);
     send(connection, "hello", hello, deadline)?;
-    let value = connection.receive(deadline)?;
+    let value = connection.receive(deadline, "did not answer")?;
     let (kind, payload) = parts(connection, &value)?;
     if kind != "hello" {
         return Err(connection.server.error(&format!("answered hello with {kind:?}")));
@@ -133,7 +133,7 @@ pub(super) fn infer(
     let deadline = connection.server.deadline();
     send(connection, "observation", payload, deadline)?;
     loop {
-        let value = connection.receive(deadline)?;
+        let value = connection.receive(deadline, "did not answer")?;
         let (kind, payload) = parts(connection, &value)?;
         let answered = entry(&value, "seq").and_then(Value::as_u64);
         match kind {
