@@ -253,7 +253,8 @@ pub enum PoseEncoding {
     Absolute,
     /// Positions of the seven arm joints, rad.
     Joints,
-    /// Displacement from the measured tool pose, each number −1..=1 times the limit of its axis, executed in full.
+    /// Displacement from the measured tool pose, each number −1..=1 times the limit of its axis. The displaced
+    /// pose is commanded; the drives cover a part of the way within the step.
     Delta {
         /// Largest translation along each axis, m.
         translation_m: f64,

@@ -3,9 +3,11 @@
 import copy
 import os
 import pickle
+import re
 import threading
 import unittest
 import warnings
+from pathlib import Path
 
 import gymnasium
 import numpy as np
@@ -341,6 +343,16 @@ class Environments(unittest.TestCase):
             warnings.simplefilter("error")
             for _ in range(STEPS):
                 env.step(far)
+
+    def test_steps_of_delta_cover_the_share_that_the_page_states(self):
+        page = (Path(__file__).resolve().parents[3] / "docs/python.md").read_text(encoding="utf-8")
+        stated = int(re.search(r"equal steps in a row cover (\d+) % of their length", page).group(1))
+        env = self.make("object_soft", obs="proprio", control="delta")
+        env.reset(seed=1000)
+        rest, step = (np.array([0, y, 0, 0, 0, 0, -1.0]) for y in (0, 1))
+        start = [env.step(rest)[0] for _ in range(5)][-1]
+        end = [env.step(step)[0] for _ in range(10)][-1]
+        self.assertAlmostEqual(100 * (end[1] - start[1]) / 0.2, stated, delta=1)
 
     def test_after_an_interrupted_step_a_vector_is_reset(self):
         envs = softvt.SoftVTVectorEnv(2, script=short_suite(), obs="proprio")
