@@ -343,7 +343,7 @@ pub struct PolicyConfig {
     pub gripper: Option<GripCode>,
     /// File of a policy in Lua, as messages name it.
     pub file: Option<String>,
-    /// SHA-256 of the files of the policy or of its profile, by name.
+    /// SHA-256 of the files of the policy, by name. A profile is a part of results as a whole, wherever its file lies.
     pub sources: BTreeMap<String, String>,
     /// Sensors that the file of the policy declares.
     pub declared: Option<DeclaredStreams>,
@@ -402,7 +402,7 @@ impl PolicyConfig {
                 }
             }
             PolicySource::Server(url) => {
-                let (profile, sources) = load_profile_of(args)?;
+                let profile = load_profile_of(args)?;
                 let profile_name = args.profile.as_deref().unwrap_or(DEFAULT_PROFILE);
                 if profile.observe_every_step && args.protocol == Some(ServerProtocol::VlaEval) {
                     let message = "observe_every_step needs the protocol openpi; in that of vla-eval every observation is a \
@@ -415,7 +415,7 @@ impl PolicyConfig {
                     replan: replan.or(Some(DEFAULT_REPLAN)),
                     gripper: Some(profile.actions.gripper.code),
                     file: None,
-                    sources,
+                    sources: BTreeMap::new(),
                     declared: Some(declared),
                     privileged: false,
                     kind: PolicyKind::Server(Arc::new(PolicyServer {
@@ -472,13 +472,13 @@ impl PolicyConfig {
     /// # Errors
     /// A file that is not a valid profile.
     pub fn client(args: &PolicyOptions, privileged: bool) -> Result<Self, RunError> {
-        let (profile, sources) = load_profile_of(args)?;
+        let profile = load_profile_of(args)?;
         Ok(Self {
             name: args.name.clone().unwrap_or_else(|| CLIENT.to_owned()),
             replan: None,
             gripper: Some(profile.actions.gripper.code),
             file: None,
-            sources,
+            sources: BTreeMap::new(),
             declared: Some(declared_streams(args, &profile)),
             privileged,
             kind: PolicyKind::Client(Arc::new(profile)),
@@ -618,14 +618,14 @@ pub fn expert_controller(opened: EpisodeSetup, mode: ExpertGrip) -> Result<Exper
     opened.expert(mode).ok_or_else(|| RunError::input("the task has no expert"))
 }
 
-/// Loads the profile that the arguments select, with SHA-256 of its files by name.
+/// Loads the profile that the arguments select.
 ///
 /// # Errors
 /// A file that is not a valid profile.
-fn load_profile_of(args: &PolicyOptions) -> Result<(Profile, BTreeMap<String, String>), RunError> {
+fn load_profile_of(args: &PolicyOptions) -> Result<Profile, RunError> {
     let name = args.profile.as_deref().unwrap_or(DEFAULT_PROFILE);
-    let (mut profile, sources) = match Profile::named(name) {
-        Some(profile) => (profile, BTreeMap::new()),
+    let mut profile = match Profile::named(name) {
+        Some(profile) => profile,
         None => load_profile(Path::new(name))?,
     };
     if let Some(code) = args.gripper {
@@ -635,7 +635,7 @@ fn load_profile_of(args: &PolicyOptions) -> Result<(Profile, BTreeMap<String, St
         })?;
         profile.actions.gripper = values;
     }
-    Ok((profile, sources))
+    Ok(profile)
 }
 
 /// Refuses options that the policy would ignore.

@@ -50,7 +50,7 @@ pub fn select_tasks<'a>(config: &RunConfig, suite: &'a Suite) -> Result<Vec<&'a 
         let index = word.parse::<usize>().ok();
         let matches = |task: &&Task| match index {
             Some(index) => task.id == index,
-            None => task.prompt.contains(word.as_str()),
+            None => task.prompt.to_lowercase().contains(&word.to_lowercase()),
         };
         let before = selected.len();
         selected.extend(suite.tasks.iter().filter(matches));

@@ -11,7 +11,7 @@ from lerobot.configs import FeatureType, PolicyFeature
 from lerobot.envs import EnvConfig
 from lerobot.utils.constants import ACTION, OBS_ENV_STATE, OBS_IMAGES, OBS_STATE
 from softvt import SoftVTVectorEnv
-from softvt.env import FIRST_SEED
+from softvt.env import FIRST_SEED, tasks_of_run
 from softvt.profile import action_size, parse_parts, proprio_parts
 from softvt.true_state import STATE_BOUNDS
 
@@ -112,7 +112,8 @@ class SoftVTEnvConfig(EnvConfig):
             "image_size": None if self._image == _SCENE_IMAGE else self._image[:2],
             "split": self.split,
             "first_seed": self.first_seed,
-            "flags": tuple(self.flags),
+            # The environments of all tasks record one run.
+            "flags": (*self.flags, *tasks_of_run(self.task_ids, self.flags)),
             "cost": False,
             "freeze": True,
             "render_mode": self.render_mode,

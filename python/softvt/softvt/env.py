@@ -111,7 +111,8 @@ class SoftVTEnv(gymnasium.Env[Observation, np.ndarray]):
         url, token: a running server in place of the script. `control`, `gripper`, `history`, `cameras`, `image_size`, `profile` and `flags`
             are then those of the server, and are refused here.
         suite: name of one of several suites of the script; by default the first.
-        task: number of a task, part of its prompt, or several numbers, of which each reset draws one; None for all tasks.
+        task: number of a task, part of its prompt, or several numbers, of which each reset draws one; None for all tasks. A run that `flags`
+            record with --out has these tasks, unless --task is among the flags or an environment of all tasks records it.
         obs: parts of the observation (`softvt.profile.PARTS`), such as "state", or joined by +, such as "pixels+proprio". By default "state";
             with `url`, all that the server sends. Not with `profile`, which states its own.
         control: "delta" (fractions −1..1 of 20 mm and 0.2 rad, the default), "delta_osc" (of 50 mm and 0.5 rad, as LIBERO has them), "pose"
@@ -203,7 +204,7 @@ class SoftVTEnv(gymnasium.Env[Observation, np.ndarray]):
             if image_shape is not None and any("cameras.width=" in flag or "cameras.height=" in flag for flag in flags):
                 raise ValueError("image_size sets cameras.width and cameras.height; leave them out of flags, or image_size")
             own_flags = _flags(profile, image_shape, needs_truth and "--privileged" not in flags) + flags
-            self._lease = lease(_script(script), own_flags, binary, None if spec is None else spec.to_lua())
+            self._lease = lease(_script(script), own_flags, binary, None if spec is None else spec.to_lua(), tasks_of_run(task, flags))
             self._connect = self._lease.connect
         else:
             assert url is not None
@@ -801,6 +802,17 @@ def _flags(profile: str | None, image_shape: tuple[int, int] | None, needs_truth
     if needs_truth:
         flags.append("--privileged")
     return tuple(flags)
+
+
+def tasks_of_run(task: int | str | Sequence[int] | None, flags: Sequence[str]) -> tuple[str, ...]:
+    """The flag by which a run has the tasks of the argument alone. Servers that record nothing are shared by the environments of all tasks."""
+    names = {flag.split("=")[0] for flag in flags}
+    if task is None or "--out" not in names or "--task" in names:
+        return ()
+    if isinstance(task, str):
+        # A comma would separate tasks.
+        return ("--task", max(task.split(","), key=len))
+    return ("--task", ",".join(str(int(number)) for number in (task if isinstance(task, Iterable) else [task])))
 
 
 def _check_task(task: Any) -> None:

@@ -287,19 +287,29 @@ class Lease:
             shared.release()
 
 
-def lease(script: str, flags: Sequence[str] = (), binary: str | None = None, profile: str | None = None) -> Lease:
+def lease(
+    script: str, flags: Sequence[str] = (), binary: str | None = None, profile: str | None = None, narrowing: Sequence[str] = ()
+) -> Lease:
     """The use of a server of `softvt serve script flags…`: one of this process or its parent that runs already, or a new one.
 
-    A server has read its files when it started, so that files that were changed since then need another one.
+    `narrowing` are flags by which a new one serves a part of the tasks. One that runs without them serves that part too. A server has read its
+    files when it started, so that files that were changed since then need another one.
     """
     program = binary or find_binary()
-    words = json.dumps([program, os.getcwd(), script, [*flags], profile, stamps(program, script, flags)])
-    key = hashlib.sha256(words.encode()).hexdigest()
+
+    def key_of(flags: Sequence[str]) -> str:
+        words = json.dumps([program, os.getcwd(), script, [*flags], profile, stamps(program, script, flags)])
+        return hashlib.sha256(words.encode()).hexdigest()
+
+    key = key_of(flags)
     with _lock:
-        shared = _servers.get(key)
         # Other programs than workers would lose a server that ends with its last environment in this process.
-        is_worker = multiprocessing.parent_process() is not None
-        if is_worker and shared is None and (address := _announced().get(key)) is not None:
+        announced = _announced() if multiprocessing.parent_process() is not None else {}
+        if narrowing and key not in _servers and key not in announced:
+            flags = (*flags, *narrowing)
+            key = key_of(flags)
+        shared = _servers.get(key)
+        if shared is None and (address := announced.get(key)) is not None:
             url, token = address
             try:
                 Client(url, token).close()

@@ -15,6 +15,18 @@ from softvt import serve
 from suites_for_tests import FOLDER, STEPS, expert_run, recording, short_suite
 
 
+def record_held(seed: int, task: int | str, *flags: str) -> None:
+    """Steps an episode of the short suite to its end, with a server of its own."""
+    env = softvt.SoftVTEnv(short_suite(), obs="proprio", cost=False, task=task, flags=flags)
+    try:
+        env.reset(seed=seed)
+        for _ in range(STEPS):
+            *_, truncated, _ = env.step(np.zeros(7))
+        assert truncated
+    finally:
+        env.close()
+
+
 class Runs(unittest.TestCase):
     def test_a_recorded_run_has_the_record_of_the_expert_whose_actions_were_stepped(self):
         actions, record = expert_run()
@@ -37,6 +49,37 @@ class Runs(unittest.TestCase):
         self.assertEqual(recorded, record)
         for command in (["replay", str(out), "0/0"], ["report", str(out), "--out", str(FOLDER / "report")]):
             subprocess.run([softvt.find_binary(), *command], check=True, stdout=subprocess.DEVNULL)
+
+    def test_a_run_has_the_tasks_of_its_environment_and_is_resumed_by_another_server(self):
+        out = FOLDER / "resumed"
+        for seed in (1000, 1001):
+            self.assertFalse((out / "summary.json").exists())
+            record_held(seed, 3, "--episodes", "2", "--out", str(out), "--resume")
+        self.assertTrue((out / "summary.json").exists())
+        self.assertEqual(json.loads((out / "run.json").read_text())["tasks"], [3])
+        prompt = json.loads((out / "episodes.jsonl").read_text().splitlines()[0])["prompt"]
+        named = FOLDER / "named"
+        record_held(1000, prompt.upper(), "--episodes", "1", "--out", str(named))
+        self.assertTrue((named / "summary.json").exists())
+
+    def test_shards_of_an_environment_are_merged(self):
+        shards = [FOLDER / f"shard{number}" for number in (1, 2)]
+        for number, shard in enumerate(shards, 1):
+            for seed in (1000, 1001):
+                # Each shard has one of both.
+                record_held(seed, 0, "--episodes", "2", "--out", str(shard), "--shard", f"{number}/2", "--resume")
+        merged = FOLDER / "merged"
+        subprocess.run([softvt.find_binary(), "merge", str(merged), *map(str, shards)], check=True, capture_output=True)
+        self.assertEqual(len((merged / "episodes.jsonl").read_text().splitlines()), 2)
+
+    def test_environments_of_single_tasks_record_in_a_run_of_all(self):
+        arguments = {"script": short_suite(), "obs": "proprio", "cost": False}
+        arguments["flags"] = ("--episodes", "1", "--out", str(FOLDER / "all_tasks"))
+        whole = softvt.SoftVTEnv(**arguments, task=None)
+        single = softvt.SoftVTEnv(**arguments, task=3)
+        self.addCleanup(whole.close)
+        self.addCleanup(single.close)
+        self.assertEqual(whole._client.url, single._client.url)
 
     def test_episodes_that_a_run_does_not_record_are_warnings(self):
         flags = ("--episodes", "2", "--out", str(FOLDER / "left"))

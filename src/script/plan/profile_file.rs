@@ -1,9 +1,6 @@
 //! Profiles in Lua: a file that returns `softvt.profile{…}`, as the plain data by which policy servers are addressed.
 
-use std::{
-    collections::{BTreeMap, BTreeSet},
-    path::Path,
-};
+use std::{collections::BTreeSet, path::Path};
 
 use mlua::Lua;
 
@@ -21,19 +18,17 @@ use softvt_policy::{
     },
 };
 
-/// Reads the profile at `path`. Also returns the SHA-256 of every file that was read, by name.
+/// Reads the profile at `path`.
 ///
 /// # Errors
 /// If the file cannot be read or does not return a valid profile; the message names file and line.
-pub fn load_profile(path: &Path) -> Result<(Profile, BTreeMap<String, String>), ScriptError> {
-    let (sources, profile) =
-        ScriptSources::read(ScriptKind::Plan, path, &[], &VmLimits::default(), |instance| {
-            let spec = instance.expected_result("a profile's file");
-            let profile =
-                spec.and_then(|spec| ProfileReader { lua: &instance.vm.lua, spec: &spec }.profile());
-            profile.map_err(|e| instance.vm.explain(&e))
-        })?;
-    Ok((profile, sources.bundle.hashes()))
+pub fn load_profile(path: &Path) -> Result<Profile, ScriptError> {
+    let (_, profile) = ScriptSources::read(ScriptKind::Plan, path, &[], &VmLimits::default(), |instance| {
+        let spec = instance.expected_result("a profile's file");
+        let profile = spec.and_then(|spec| ProfileReader { lua: &instance.vm.lua, spec: &spec }.profile());
+        profile.map_err(|e| instance.vm.explain(&e))
+    })?;
+    Ok(profile)
 }
 
 /// Reads a profile and checks the relations between its fields.

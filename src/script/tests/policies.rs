@@ -288,7 +288,7 @@ fn profile(text: &str) -> Result<Profile, String> {
     let project = Project::new(&[("p.lua", text)]);
     let folder = format!("{}/", project.path("").display()).replace("//", "/");
     let read = load_profile(&project.path("p.lua"));
-    read.map(|(profile, _)| profile).map_err(|e| e.to_string().replace(&folder, ""))
+    read.map_err(|e| e.to_string().replace(&folder, ""))
 }
 
 /// A shipped profile's text, changed.
