@@ -1583,7 +1583,7 @@ local EpisodeBrief = {}
 ---@class softvt.Observation
 ---@field time number Time since the policy took over, s.
 ---@field position number[] Tool position, m.
----@field axis_angle number[] Tool orientation as axis-angle, rad.
+---@field axis_angle number[] Tool orientation as axis-angle, rad, continuous along the episode: its length may exceed π.
 ---@field quaternion number[] Tool orientation as quaternion w, x, y, z with w ≥ 0.
 ---@field joints number[] The seven joint angles of the arm, rad.
 ---@field width number Measured distance of the gels, 0 to 0.08 m, with the steps and the offset of a real hand; exact with observes.drives.

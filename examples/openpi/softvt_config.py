@@ -28,23 +28,12 @@ def _picture(value) -> np.ndarray:
     return np.transpose(value, (1, 2, 0)) if value.shape[0] == 3 else value
 
 
-def one_side(poses: np.ndarray) -> np.ndarray:
-    """The same rotations, each by the vector whose first number is not negative: where the tool points down, the two vectors
-    of nearly equal turns lie 2 pi apart, and which of them comes is chance. softvt takes either."""
-    turn = poses[..., 3:6]
-    angle = np.maximum(np.linalg.norm(turn, axis=-1, keepdims=True), 1e-9)
-    turn = np.where(turn[..., :1] < 0, turn * (1 - 2 * np.pi / angle), turn)
-    return np.concatenate([poses[..., :3], turn, poses[..., 6:]], axis=-1).astype(np.float32)
-
-
 @dataclasses.dataclass(frozen=True)
 class SoftVTInputs(_transforms.DataTransformFn):
     """A sample as pi0.5 takes it, in training and when served. The touch of both fingers takes the place of a second wrist."""
 
     model_type: _model.ModelType
     tactile: bool
-    # Not in the paper: see one_side. Of no use for joint positions.
-    fold_rotations: bool = False
 
     def __call__(self, data: dict) -> dict:
         base = _picture(data["image"])
@@ -62,8 +51,6 @@ class SoftVTInputs(_transforms.DataTransformFn):
         }
         if "actions" in data:
             sample["actions"] = np.asarray(data["actions"], dtype=np.float32)
-        if self.fold_rotations:
-            sample |= {key: one_side(sample[key]) for key in ("state", "actions") if key in sample}
         if "prompt" in data:
             sample["prompt"] = data["prompt"]
         return sample

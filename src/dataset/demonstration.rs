@@ -1,6 +1,7 @@
 //! [`Demonstration`]: a rollout as training data, without its images.
 
 use softvt_benchmark::CONTROL_DT;
+use softvt_geometry::Vec3;
 use softvt_policy::{Action, profile::GripCode};
 use softvt_records::record::EpisodeRecord;
 use softvt_robot::{
@@ -26,7 +27,7 @@ use super::{
 pub struct Demonstration {
     /// Header and verdict of the episode.
     pub record: EpisodeRecord,
-    /// Commanded action per control step.
+    /// Commanded action per control step, as it was executed. Files have continuous rotation vectors in its place.
     pub actions: Vec<Action>,
     /// Joint positions that each action means, rad; see
     /// [`FinishedEpisode::joint_commands`](softvt_rollout::FinishedEpisode::joint_commands).
@@ -113,6 +114,16 @@ impl Demonstration {
                 ),
             );
         }
+        let pairs = || self.actions.iter().zip(continuous(&self.actions));
+        if pairs().any(|(action, written)| action.axis_angle_b != written.axis_angle_b) {
+            let vectors = self.actions.iter().flat_map(|action| <[f64; 3]>::from(action.axis_angle_b));
+            all.push(
+                DataStream::f64(COMMANDED_ROTATIONS, &[3], vectors.collect()).unit("rad", BASE).attribute(
+                    "meaning",
+                    "axis-angle of the actions as commanded, which may change sign at half a turn",
+                ),
+            );
+        }
         let last = |step: usize| step + 1 == steps;
         all.extend([
             DataStream::f64("rewards", &[], (0..steps).map(|step| f64::from(u8::from(last(step)))).collect()),
@@ -141,14 +152,17 @@ impl Demonstration {
                 "force: mean pressing force of both pads after the step, N, while closed; -1 while open",
             ),
         };
-        let rows = self.actions.iter().zip(grip);
+        let rows = continuous(&self.actions).zip(grip);
         let rows = rows
-            .flat_map(|(action, closure)| Action { grip: GripTarget::Closure(closure), ..*action }.to_array())
+            .flat_map(|(action, closure)| Action { grip: GripTarget::Closure(closure), ..action }.to_array())
             .collect();
         let unit = if code == GripCode::Force { "m, rad, N" } else { "m, rad, 1" };
         DataStream::f64(actions_stream_name(code), &[7], rows)
             .unit(unit, BASE)
-            .attribute("meaning", "absolute tool position (m) and axis-angle (rad), gripper")
+            .attribute(
+                "meaning",
+                "absolute tool position (m) and axis-angle (rad, continuous along the episode), gripper",
+            )
             .attribute("gripper", meaning)
             .attribute("grip_code", code.name())
     }
@@ -158,8 +172,16 @@ impl Demonstration {
 pub(crate) const JOINT_TORQUES: &str = "obs/joint_torques";
 /// Name of the stream of actions as joint positions.
 pub(crate) const JOINT_ACTIONS: &str = "actions_joints";
+/// Name of the stream of the rotation vectors as commanded, rad; present if those of the actions are others.
+pub(crate) const COMMANDED_ROTATIONS: &str = "commanded_rotations";
 /// Name of the stream that marks actions that commanded joint positions; present if there are any.
 pub(crate) const COMMANDS_JOINTS: &str = "commands_joints";
+
+/// The actions with rotation vectors that are continuous along the episode.
+pub(crate) fn continuous(actions: &[Action]) -> impl Iterator<Item = Action> {
+    let vectors = rotation::continuous(actions.iter().map(|action| action.axis_angle_b));
+    actions.iter().zip(vectors).map(|(action, axis_angle_b)| Action { axis_angle_b, ..*action })
+}
 
 /// Name of the stream of actions in a grip code.
 pub(crate) fn actions_stream_name(code: GripCode) -> &'static str {
@@ -210,10 +232,11 @@ fn proprioception_streams(recording: &StateRecording, actions: &[Action]) -> Vec
     let commanded =
         |i: usize| i.checked_sub(1).map_or(0.0, |before| actions[before].closure().clamp(0.0, 1.0));
     let pose = each(&|i| pose_row(&states[i].tool_b).to_vec());
+    let turns = states.iter().map(|state| rotation::axis_angle(&state.tool_b.rotation));
+    let turns: Vec<Vec3> = rotation::continuous(turns).collect();
     let state = each(&|i| {
-        let tool = states[i].tool_b;
-        let turn = rotation::axis_angle(&tool.rotation);
-        tool.translation.vector.iter().chain(turn.iter()).copied().chain([0.5 * width(i)]).collect()
+        let place = states[i].tool_b.translation.vector;
+        place.iter().chain(turns[i].iter()).copied().chain([0.5 * width(i)]).collect()
     });
     vec![
         DataStream::f64("obs/eef_pose", &[7], pose)

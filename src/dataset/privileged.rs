@@ -8,7 +8,10 @@ use softvt_geometry::Vec3;
 use softvt_policy::PadForce;
 use softvt_rollout::{BodyConfiguration, FinishedEpisode, Sensors, StateRecording, StepTrace};
 
-use super::stream::{DataStream, StreamValues, pose_row};
+use super::{
+    demonstration::continuous,
+    stream::{DataStream, StreamValues, pose_row},
+};
 
 /// All privileged streams. Row i is the state before action i, as in every stream of a demonstration.
 pub(super) fn streams(finished: &FinishedEpisode, recording: &StateRecording) -> Vec<DataStream> {
@@ -27,9 +30,7 @@ fn forces(finished: &FinishedEpisode, recording: &StateRecording) -> Vec<DataStr
         loads.iter().flatten().flat_map(|pad| <[f64; 3]>::from(pick(pad))).collect()
     };
     let force = of(&|pad| pad.wrench.force);
-    let with_forces = finished
-        .actions
-        .iter()
+    let with_forces = continuous(&finished.actions)
         .zip(force.as_chunks::<6>().0)
         .flat_map(|(a, force)| a.to_array().into_iter().chain(*force).collect::<Vec<f64>>());
     vec![

@@ -4,10 +4,11 @@ use std::path::Path;
 
 use serde::Serialize;
 
-use super::{DatasetError, TaskFile};
+use super::{DatasetError, TaskFile, demonstration};
 use softvt_benchmark::CONTROL_DT;
 use softvt_common::text::{TextColumn, TextTable, decimal};
 use softvt_media::histogram::{self, Histogram};
+use softvt_policy::Action;
 
 /// Columns of an action.
 const ACTION_NAMES: [&str; 7] =
@@ -64,13 +65,12 @@ pub fn column_statistics(paths: &[impl AsRef<Path>]) -> Result<Vec<ColumnStatist
     for path in paths {
         let file = TaskFile::open(path.as_ref())?;
         for &demo in &file.demos {
-            let actions = file.actions(demo)?;
+            let actions: Vec<[f64; 7]> =
+                demonstration::continuous(&file.actions(demo)?).map(Action::to_array).collect();
             lengths.push(actions.len() as f64);
-            speeds.extend(
-                actions.windows(2).map(|pair| commanded_speed(pair[0].to_array(), pair[1].to_array())),
-            );
-            for action in &actions {
-                columns.iter_mut().zip(action.to_array()).for_each(|(column, x)| column.push(x));
+            speeds.extend(actions.windows(2).map(|pair| commanded_speed(pair[0], pair[1])));
+            for action in actions {
+                columns.iter_mut().zip(action).for_each(|(column, x)| column.push(x));
             }
             peaks.extend(file.record(demo).ok().and_then(|record| record.verdict.d_peak));
             // Missing for rigid targets and without privileged streams.

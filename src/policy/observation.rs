@@ -36,7 +36,8 @@ pub struct SensorStreams {
 pub struct RobotState {
     /// Tool position in the robot base frame, m.
     pub ee_position_b: Vec3,
-    /// Tool orientation in the base frame as axis-angle, rad.
+    /// Tool orientation in the base frame as axis-angle, rad: continuous along the episode, from the vector that is
+    /// nearest to a hand that points straight down, (π, 0, 0).
     pub ee_axis_angle_b: Vec3,
     /// Arm joint angles, rad.
     pub joints: [f64; 7],

@@ -1,5 +1,7 @@
 //! Conventions for rotations in files and actions: quaternions with w ≥ 0, and rotation vectors (axis times angle).
 
+use std::f64::consts::{PI, TAU};
+
 use softvt_geometry::{Quat, Vec3};
 
 /// Canonical quaternion of a rotation: w ≥ 0, and at w = 0 a positive first non-zero component, so that equal half
@@ -20,6 +22,34 @@ pub fn axis_angle(rotation: &Quat) -> Vec3 {
     if sine < 1e-9 { axis * 2.0 } else { axis * (2.0 * sine.atan2(q.w) / sine) }
 }
 
+/// Rotation vector (rad) of a hand that points straight down. The first vector of an episode is the nearest one to it,
+/// so that episodes do not differ by the sign of a half turn.
+pub const POINTING_DOWN: Vec3 = Vec3::new(PI, 0.0, 0.0);
+
+/// Of all vectors of the rotation of `vector` (rad), which are 2π apart along its axis, the nearest one to `reference`.
+/// `vector` itself is returned bit for bit if it is that one.
+///
+/// Applied along an episode, each time with the vector before, it gives vectors that are continuous where
+/// [`axis_angle`] changes sign at half a turn.
+pub fn nearest(vector: Vec3, reference: &Vec3) -> Vec3 {
+    let angle = vector.norm();
+    // Without an angle there is no axis.
+    if angle < 1e-9 {
+        return vector;
+    }
+    let axis = vector / angle;
+    let turns = ((axis.dot(reference) - angle) / TAU).round();
+    if turns == 0.0 { vector } else { vector + axis * (turns * TAU) }
+}
+
+/// The [`nearest`] vectors along an episode, from [`POINTING_DOWN`] on.
+pub fn continuous(vectors: impl IntoIterator<Item = Vec3>) -> impl Iterator<Item = Vec3> {
+    vectors.into_iter().scan(POINTING_DOWN, |before, vector| {
+        *before = nearest(vector, before);
+        Some(*before)
+    })
+}
+
 /// Rotation of a rotation vector (rad, any length), with w ≥ 0.
 pub fn from_axis_angle(vector: &Vec3) -> Quat {
     canonical(&Quat::from_scaled_axis(*vector))
@@ -32,8 +62,6 @@ pub fn error(from: &Quat, to: &Quat) -> Vec3 {
 
 #[cfg(test)]
 mod tests {
-    use std::f64::consts::PI;
-
     use proptest::prelude::*;
 
     use super::*;
@@ -71,6 +99,36 @@ mod tests {
             let other = Quat::new_unchecked(-one.into_inner());
             prop_assert_eq!(canonical(&one).into_inner(), canonical(&other).into_inner());
             prop_assert_eq!(axis_angle(&one), axis_angle(&other));
+        }
+
+        #[test]
+        fn rotation_vectors_are_continuous_where_the_angle_passes_half_a_turn(
+            axis in any_axis(), start in -0.2..0.2_f64, step in -0.3..0.3_f64,
+        ) {
+            let turns: Vec<Quat> = (0..60)
+                .map(|k| {
+                    let tilt = start + 0.01 * (f64::from(k) * step).sin();
+                    let down = Quat::from_scaled_axis(Vec3::z() * (0.05 * f64::from(k))) * from_axis_angle(&POINTING_DOWN);
+                    Quat::from_scaled_axis(axis * tilt) * down
+                })
+                .collect();
+            let vectors: Vec<Vec3> = continuous(turns.iter().map(axis_angle)).collect();
+            prop_assert!((vectors[0] - POINTING_DOWN).norm() < 0.6, "{}", vectors[0]);
+            for (vector, turn) in vectors.iter().zip(&turns) {
+                prop_assert!(from_axis_angle(vector).angle_to(turn) < 1e-7);
+            }
+            for pair in vectors.windows(2) {
+                prop_assert!((pair[1] - pair[0]).norm() < 0.3, "{} {}", pair[0], pair[1]);
+            }
+        }
+
+        #[test]
+        fn a_vector_that_is_the_nearest_one_keeps_its_bits(axis in any_axis(), angle in any_angle()) {
+            let vector = axis * angle;
+            prop_assert_eq!(nearest(vector, &vector), vector);
+            let other = vector - axis * TAU;
+            prop_assume!(angle > 1e-6);
+            prop_assert!((nearest(vector, &other) - other).norm() < 1e-12);
         }
 
         #[test]

@@ -36,6 +36,8 @@ pub struct RobotInstance {
     ik: DiffIk,
     arm: ArmSetpoint,
     gripper: GripperSetpoint,
+    /// Rotation vector of the tool before the last control step, base frame, rad.
+    ee_axis_angle_b: Vec3,
     /// Commands that the robot has not responded to yet, oldest first.
     delayed: VecDeque<DelayedCommand>,
 }
@@ -112,6 +114,7 @@ impl RobotInstance {
             ik: DiffIk::new(&spec.ik, *q, control_dt),
             arm: ArmSetpoint::new(*q, control_dt),
             gripper: GripperSetpoint::new(&spec.gripper, gripper::MAX_WIDTH),
+            ee_axis_angle_b: rotation::POINTING_DOWN,
             delayed: VecDeque::with_capacity(spec.latency as usize + 1),
             spec: spec.clone(),
         }
@@ -123,6 +126,7 @@ impl RobotInstance {
     /// Returns the joint positions (rad) that the command to which it now responds means, without a disturbance: those
     /// that it commands, or those of inverse kinematics. `None` while there is no such command.
     pub fn command(&mut self, world: &mut World, arm: ArmCommand, grip: GripTarget) -> Option<ArmAngles> {
+        self.ee_axis_angle_b = self.ee_axis_angle_b(world);
         self.delayed.push_back(DelayedCommand { arm, grip });
         if self.delayed.len() <= self.spec.latency as usize {
             return None;
@@ -169,6 +173,12 @@ impl RobotInstance {
         self.ik.tool_pose(&self.q(world))
     }
 
+    /// Rotation vector of the tool, base frame, rad: of those of its rotation the nearest one to that before the last
+    /// control step, so that it is continuous along an episode.
+    pub fn ee_axis_angle_b(&self, world: &World) -> Vec3 {
+        rotation::nearest(rotation::axis_angle(&self.tool_b(world).rotation), &self.ee_axis_angle_b)
+    }
+
     /// Origin of the hand frame, m, world.
     pub fn hand_w(&self, world: &World) -> Vec3 {
         (world.articulation(self.articulation).poses()[panda::HAND_LINK] * panda::hand_in_link())
@@ -192,10 +202,9 @@ impl RobotInstance {
     pub fn state(&self, world: &World, seed: SensorSeed) -> RobotState {
         let width = self.width(world);
         let articulation = world.articulation(self.articulation);
-        let tool_b = self.tool_b(world);
         RobotState {
-            ee_position_b: tool_b.translation.vector,
-            ee_axis_angle_b: rotation::axis_angle(&tool_b.rotation),
+            ee_position_b: self.tool_b(world).translation.vector,
+            ee_axis_angle_b: self.ee_axis_angle_b(world),
             joints: self.q(world),
             joint_velocities: std::array::from_fn(|i| articulation.state.v[i]),
             joint_torques: std::array::from_fn(|i| articulation.drive_forces()[i]),

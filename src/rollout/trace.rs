@@ -15,7 +15,7 @@ pub struct StepTrace {
     pub time_s: f64,
     /// Tool position, base frame, m.
     pub ee_position_b: [f64; 3],
-    /// Tool orientation, base frame, axis-angle, rad.
+    /// Tool orientation, base frame, axis-angle, rad, continuous along the episode.
     pub ee_axis_angle_b: [f64; 3],
     /// Arm joint angles, rad.
     pub joints: [f64; 7],
@@ -81,7 +81,7 @@ impl StepTrace {
             step,
             time_s,
             ee_position_b: tool.translation.vector.into(),
-            ee_axis_angle_b: rotation::axis_angle(&tool.rotation).into(),
+            ee_axis_angle_b: sim.robot.ee_axis_angle_b(&sim.world).into(),
             joints: sim.robot.q(&sim.world),
             gripper_width_m: sim.robot.width(&sim.world),
             closure: sim.robot.closure(),

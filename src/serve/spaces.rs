@@ -20,8 +20,8 @@ use softvt_robot::panda::{self, JointRange};
 
 /// Bound of positions along any axis of the base frame, m; larger than the reach of the arm.
 const MAX_POSITION_M: f64 = 2.0;
-/// Bound of rotation angles, rad: half a turn, and a margin for rounding.
-const MAX_ANGLE: f64 = PI + 1e-3;
+/// Bound of rotation angles, rad: vectors that are continuous along an episode pass half a turn.
+const MAX_ANGLE: f64 = 2.0 * PI;
 /// Bound of marker positions, px; larger than a tactile image.
 const MAX_MARKER_PX: f64 = 1e4;
 /// Bound of joint velocities, rad/s, and of the torques of their drives, N m; larger than what the arm reaches.

@@ -133,9 +133,9 @@ fn rows_are_the_inputs_of_a_policy() {
     Recording::new(project.run("x.lua").tasks(&[0]), 1, "data").record();
     export(&config(&project, V21, "out"));
     let rows = rows(&project.path("out/data/chunk-000/episode_000000.parquet"));
-    let actions = TaskFile::open(&project.path("data/hdf5/one_task0_demo.hdf5"))
-        .and_then(|file| file.actions(0))
-        .expect("actions");
+    let file = TaskFile::open(&project.path("data/hdf5/one_task0_demo.hdf5")).expect("a file");
+    let (actions, written) =
+        (file.actions(0).expect("actions"), file.array(0, "actions").expect("actions").values);
     assert!(
         rows.len() >= 12 && rows.len() == actions.len(),
         "longer than a policy's history: {}",
@@ -147,7 +147,9 @@ fn rows_are_the_inputs_of_a_policy() {
     let episode = manifest::read(&project.path("data")).expect("a manifest")[0].episode;
     let mut answer = client.reset(episode.into());
     let mut touched = false;
-    for (step, (row, action)) in rows.iter().zip(&actions).enumerate() {
+    for (step, ((row, action), written)) in
+        rows.iter().zip(&actions).zip(written.as_chunks::<7>().0).enumerate()
+    {
         let observation = get(&answer, "observation");
         for name in ["image", "wrist_image", "tactile_image"] {
             assert!(pixels(field(row, name)) == sent(observation, name), "{name} at step {step}");
@@ -158,10 +160,8 @@ fn rows_are_the_inputs_of_a_policy() {
         let kept: Vec<f32> = [0, 7, 8].into_iter().flat_map(|i| markers[396 * i..][..396].to_vec()).collect();
         assert_eq!(numbers(field(row, "tactile_marker_motion")), kept, "step {step}");
         touched |= kept[396..792] != kept[792..];
-        let (p, r) = (action.position_b, action.axis_angle_b);
-        let command = [p.x, p.y, p.z, r.x, r.y, r.z, action.closure()];
-        assert_eq!(numbers(field(row, "actions")), command.map(|x| x as f32), "step {step}");
-        answer = client.step(&[command]);
+        assert_eq!(numbers(field(row, "actions")), written.map(|x| x as f32), "step {step}");
+        answer = client.step(&[action.to_array()]);
     }
     assert!(touched, "the block moves markers");
     assert_eq!(get(&answer, "terminated").as_bool(), Some(true));

@@ -164,6 +164,25 @@ class Datasets(unittest.TestCase):
         np.testing.assert_array_equal(whole["actions"][-1].astype(np.float32), last["actions"][0])
         np.testing.assert_array_equal(whole["state"][-1], last["state"])
 
+    def test_rotation_vectors_are_continuous_and_those_that_an_environment_observes(self):
+        demo = softvt.Dataset(self.folder, task=0, keys=("state",)).demonstrations[0]
+        with h5py.File(demo.file) as file:
+            group = file["data/demo_0"]
+            actions, states = group["actions"][:], group["obs/state"][:]
+            commanded, attempt = actions.copy(), int(group.attrs["attempt"])
+            if "commanded_rotations" in group:
+                commanded[:, 3:6] = group["commanded_rotations"][:]
+        for rows in (actions, states):
+            self.assertLess(np.linalg.norm(np.diff(rows[:, 3:6], axis=0), axis=1).max(), 0.5)
+            self.assertLess(np.linalg.norm(rows[0, 3:6] - [np.pi, 0, 0]), 0.5)
+        env = softvt.SoftVTEnv("object_rigid", obs="proprio", control="pose", cost=False, split="demonstration")
+        try:
+            seen = [env.reset(options={"episode": attempt})[0]]
+            seen += [env.step(row)[0] for row in commanded[:-1]]
+        finally:
+            env.close()
+        np.testing.assert_array_equal(np.stack(seen)[:, :6], states[:, :6].astype(np.float32))
+
     def test_actions_may_be_joint_positions(self):
         data = softvt.Dataset(self.folder, keys=("arm_joint_pos",), control="joints", horizon=2)
         self.assertEqual(data[5]["actions"].shape, (2, 8))

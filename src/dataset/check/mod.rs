@@ -4,6 +4,7 @@ mod readings;
 
 use std::{
     collections::{BTreeMap, BTreeSet},
+    f64::consts::PI,
     path::{Component, Path, PathBuf},
 };
 
@@ -407,6 +408,25 @@ impl DemoCheck<'_> {
         }
     }
 
+    /// Counts the jumps of the rotation vectors of poses by a full turn about their axis, as recordings of earlier
+    /// versions have them: at half a turn, and from one demonstration to another.
+    fn check_rotation_vectors(&mut self, name: &str, rows: &[f64]) {
+        let vectors: Vec<Vec3> =
+            rows.chunks_exact(7).map(|row| Vec3::from_column_slice(&row[3..6])).collect();
+        let continuous = rotation::continuous(vectors.iter().copied());
+        let turned = vectors.iter().zip(continuous).map(|(vector, near)| (vector - near).norm() > PI);
+        let (jumps, _) =
+            turned.fold((0, false), |(jumps, before), now| (jumps + usize::from(now != before), now));
+        if jumps > 0 {
+            let what = format!(
+                "{} of the rotation vector by a full turn, to another vector of nearly the same rotation: a policy cannot learn \
+                 them; record again with this version, or import the file, which writes continuous vectors",
+                counted(jumps, "jump")
+            );
+            self.add(name, what);
+        }
+    }
+
     /// Checks that commanded joint positions are within the limits of the joints, and lead to the pose of the action
     /// where they are the action.
     fn check_joint_actions(&mut self) {
@@ -534,6 +554,8 @@ impl DemoCheck<'_> {
             let (time, expected) = (times[step], expected(step));
             self.add("timestamps", format!("step {step}: {time} s, expected {expected} at {CONTROL_HZ} Hz"));
         }
+        self.check_rotation_vectors("obs/state", &states);
+        self.check_rotation_vectors("actions", &actions);
         let is_binary_of = |(a, b): (&[f64], &[f64])| a[..6] == b[..6] && [0.0, 1.0].contains(&b[6]);
         let mut both = actions.chunks_exact(7).zip(binary.chunks_exact(7));
         if let Some(step) = both.position(|pair| !is_binary_of(pair)) {

@@ -17,7 +17,9 @@ const STEPS: usize = 9;
 fn demonstration(salt: f64) -> Demonstration {
     let posture = |step: usize| [0.0, -0.5, 0.0, -2.0, 0.0, 1.6, 0.8].map(|q| q + 0.01 * step as f64 + salt);
     let place = |step: usize| panda::tool_pose(&posture(step)).translation.vector;
-    let turn = |step: usize| rotation::axis_angle(&panda::tool_pose(&posture(step)).rotation);
+    let turns = (0..STEPS).map(|step| rotation::axis_angle(&panda::tool_pose(&posture(step)).rotation));
+    let turns: Vec<Vec3> = rotation::continuous(turns).collect();
+    let turn = |step: usize| turns[step];
     let q = |step: usize| rotation::from_axis_angle(&turn(step));
     let each = |row: &dyn Fn(usize) -> Vec<f64>| (0..STEPS).flat_map(row).collect::<Vec<f64>>();
     let state = |step: usize| {
@@ -134,6 +136,51 @@ fn problems_of_a_stream_name_its_file_and_key() {
     let shape =
         problems(|streams| streams[2] = DataStream::f64("obs/arm_joint_pos", &[6], vec![0.0; 6 * STEPS]));
     assert!(shape.contains("obs/arm_joint_pos: expected the shape (steps, 7), got [9, 6]"), "{shape}");
+}
+
+/// The same rotation by the vector that is a full turn away.
+fn opposite(vector: Vec3) -> Vec3 {
+    vector * (1.0 - 2.0 * PI / vector.norm())
+}
+
+#[test]
+fn commands_that_change_sign_at_half_a_turn_are_written_continuously_and_read_bit_for_bit() {
+    let mut demonstration = demonstration(0.0);
+    let states = demonstration.actions.clone();
+    for action in demonstration.actions.iter_mut().step_by(2) {
+        action.axis_angle_b = opposite(action.axis_angle_b);
+    }
+    let (_folder, path) = write(&demonstration, "task.hdf5");
+    let read = TaskFile::open(&path).unwrap();
+    assert_eq!(read.actions(0).unwrap(), demonstration.actions);
+    for code in GripCode::ALL {
+        let rows = read.array(0, actions_stream_name(code)).unwrap().values;
+        for (row, action) in rows.as_chunks::<7>().0.iter().zip(&states) {
+            assert!(
+                (Action::from_array(*row).axis_angle_b - action.axis_angle_b).norm() < 1e-12,
+                "{code:?}: {row:?}"
+            );
+        }
+    }
+    assert_eq!(file(&path).unwrap().problems, [""; 0]);
+}
+
+#[test]
+fn rotation_vectors_that_change_sign_are_counted() {
+    for (rows, words) in [
+        (4..STEPS, "obs/state: 1 jump of the rotation vector by a full turn"),
+        (4..5, "obs/state: 2 jumps of the rotation vector"),
+        // A demonstration on the other side than the others.
+        (0..STEPS, "obs/state: 1 jump of the rotation vector"),
+    ] {
+        let text = problems(|streams| {
+            for row in &mut numbers(&mut streams[1]).as_chunks_mut::<7>().0[rows.clone()] {
+                let other = opposite(Vec3::from_column_slice(&row[3..6]));
+                row[3..6].copy_from_slice(other.as_slice());
+            }
+        });
+        assert!(text.contains(words) && text.contains("record again"), "{text}");
+    }
 }
 
 #[test]

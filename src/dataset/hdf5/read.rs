@@ -13,12 +13,13 @@ use serde_json::Value;
 use super::{
     super::{
         DataStream, DatasetError, Demonstration, StreamValues,
-        demonstration::{COMMANDS_JOINTS, JOINT_ACTIONS, actions_stream_name},
+        demonstration::{COMMANDED_ROTATIONS, COMMANDS_JOINTS, JOINT_ACTIONS, actions_stream_name},
         layout,
     },
     limits::{self, ListError},
 };
 use softvt_common::files::FileError;
+use softvt_geometry::Vec3;
 use softvt_policy::{Action, profile::GripCode};
 use softvt_records::record::EpisodeRecord;
 use softvt_robot::{ik::ArmAngles, panda::ARM_DOFS};
@@ -351,8 +352,9 @@ impl TaskFile {
         Ok(ImageStack { bytes: bytes.map_err(self.failed(demo, name))?, height, width })
     }
 
-    /// Reads the actions of a demonstration: absolute tool poses in the base frame, or joint positions where the
-    /// recorded policy commanded these, and continuous gripper closure.
+    /// Reads the actions of a demonstration as they were commanded, bit for bit: absolute tool poses in the base frame,
+    /// or joint positions where the recorded policy commanded these, and continuous gripper closure. Their rotation
+    /// vectors may change sign at half a turn, where those of the stream `actions` are continuous.
     ///
     /// # Errors
     /// The demonstration is missing, or its actions are not finite numbers of shape (steps, 7 or more).
@@ -365,6 +367,16 @@ impl TaskFile {
         let rows = self.finite_array(demo, "actions")?.values;
         let action = |row: &[f64]| Action::from_array(std::array::from_fn(|i| row[i]));
         let mut actions: Vec<Action> = rows.chunks_exact(shape[1]).map(action).collect();
+        if self.has(demo, COMMANDED_ROTATIONS) {
+            let vectors = self.finite_array(demo, COMMANDED_ROTATIONS)?.values;
+            if vectors.len() != 3 * actions.len() {
+                let what = format!("{} numbers for {} actions", vectors.len(), actions.len());
+                return Err(self.error(demo, COMMANDED_ROTATIONS, what));
+            }
+            for (action, vector) in actions.iter_mut().zip(vectors.as_chunks::<3>().0) {
+                action.axis_angle_b = Vec3::from(*vector);
+            }
+        }
         if self.has(demo, COMMANDS_JOINTS) {
             let StreamValues::U8(are_joints) = self.stream(demo, COMMANDS_JOINTS)?.values else {
                 return Err(self.error(demo, COMMANDS_JOINTS, "expected uint8"));

@@ -79,7 +79,7 @@ class! {
             time: "number" { get(_, this) { this.observation.time_s } }
             /// Tool position, m.
             position: "number[]" { get(_, this) { this.observation.robot.ee_position_b } }
-            /// Tool orientation as axis-angle, rad.
+            /// Tool orientation as axis-angle, rad, continuous along the episode: its length may exceed π.
             axis_angle: "number[]" { get(_, this) { this.observation.robot.ee_axis_angle_b } }
             /// Tool orientation as quaternion w, x, y, z with w ≥ 0.
             quaternion: "number[]" { get(_, this) { wxyz(&rotation::from_axis_angle(&this.observation.robot.ee_axis_angle_b)) } }
