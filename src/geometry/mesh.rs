@@ -2,9 +2,10 @@
 
 use std::collections::BTreeMap;
 
+use rstar::{RTree, primitives::GeomWithData};
 use serde::{Deserialize, Serialize};
 
-use super::Vec3;
+use super::{Vec3, union_find::UnionFind};
 
 /// A triangle mesh with vertices and triangles by index.
 #[derive(Clone, Debug, PartialEq, Default, Serialize, Deserialize)]
@@ -71,6 +72,21 @@ impl Mesh {
     pub fn triangle_area(&self, triangle: &[u32; 3]) -> f64 {
         let [a, b, c] = triangle.map(|v| self.vertices[v as usize]);
         0.5 * (b - a).cross(&(c - a)).norm()
+    }
+
+    /// Moves vertices that are at most `distance` (m) apart, also by way of others, to the first of them.
+    pub(crate) fn snapped(&self, distance: f64) -> Self {
+        let points = self.vertices.iter().enumerate();
+        let points = points.map(|(index, v)| GeomWithData::new([v.x, v.y, v.z], index));
+        let tree = RTree::bulk_load(points.collect());
+        let mut sets = UnionFind::new(self.vertices.len());
+        for point in &tree {
+            for near in tree.locate_within_distance(*point.geom(), distance * distance) {
+                sets.union(point.data, near.data);
+            }
+        }
+        let vertices = (0..self.vertices.len()).map(|index| self.vertices[sets.find(index)]).collect();
+        Self { vertices, ..self.clone() }
     }
 
     /// Merges vertices with equal positions and removes triangles that become degenerate.

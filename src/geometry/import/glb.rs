@@ -23,16 +23,32 @@ type Transform = nalgebra::Matrix4<f64>;
 const MAX_DEPTH: usize = 64;
 /// Largest number of nodes of a scene, each counted once per parent that is visited.
 const MAX_NODES: usize = 10_000;
+/// Ends of the names of extensions whose vertices are not read, and the way to do without.
+const UNREAD: [(&str, &str); 4] = [
+    ("_draco_mesh_compression", DECODE),
+    ("_meshopt_compression", DECODE),
+    ("_mesh_quantization", DECODE),
+    ("_mesh_gpu_instancing", "export each instance as a node of its own"),
+];
+const DECODE: &str = "decode it with the command: npx @gltf-transform/cli dequantize in.glb out.glb";
 /// Size of the header of a GLB file and the offset of its declared length, bytes.
 const HEADER_BYTES: usize = 12;
 const LENGTH_OFFSET: usize = 8;
 
 pub(super) fn read(bytes: &[u8]) -> Result<Mesh, MeshImportError> {
     check_length(bytes)?;
-    let file = gltf::Gltf::from_slice(bytes)
-        .map_err(|error| MeshImportError::Unreadable { format: "GLB", reason: error.to_string() })?;
+    let unreadable =
+        |error: gltf::Error| MeshImportError::Unreadable { format: "GLB", reason: error.to_string() };
+    let gltf::Gltf { document, blob } =
+        gltf::Gltf::from_slice_without_validation(bytes).map_err(unreadable)?;
+    for extension in document.extensions_used().chain(document.extensions_required()) {
+        if let Some((_, fix)) = UNREAD.iter().find(|(end, _)| extension.ends_with(end)) {
+            return Err(MeshImportError::Extended { extension: extension.to_owned(), fix });
+        }
+    }
+    let file = gltf::Document::from_json(document.into_json()).map_err(unreadable)?;
     let outside = MeshImportError::Unsupported("buffers outside of the file");
-    let blob = file.blob.as_deref().ok_or_else(|| outside.clone())?;
+    let blob = blob.as_deref().unwrap_or_default();
     let is_inside =
         |buffer: gltf::Buffer| matches!(buffer.source(), Source::Bin) && buffer.length() <= blob.len();
     if !file.buffers().all(is_inside) {
@@ -237,6 +253,11 @@ impl Reader<'_> {
         let columns = node.transform().matrix();
         let pose = parent * Transform::from_fn(|row, column| f64::from(columns[column][row]));
         if let Some(mesh) = node.mesh() {
+            let is_morphed = mesh.primitives().any(|primitive| primitive.morph_targets().next().is_some());
+            let weights = node.weights().or(mesh.weights()).unwrap_or_default();
+            if let Some(&weight) = weights.iter().find(|weight| is_morphed && **weight != 0.0) {
+                return Err(MeshImportError::Morphed { mesh: mesh.index(), weight });
+            }
             let mut primitives = mesh.primitives();
             primitives.try_for_each(|primitive| self.add_primitive(&primitive, mesh.index(), &pose))?;
         }

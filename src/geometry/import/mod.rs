@@ -2,11 +2,14 @@
 
 mod glb;
 mod obj;
+mod polygon;
+mod stl;
+mod text;
 
-use std::{io::Cursor, sync::Arc};
+use std::sync::Arc;
 
 use super::{
-    Mat3, Vec3,
+    Mat3,
     mesh::{Mesh, MeshError},
 };
 
@@ -15,8 +18,9 @@ use super::{
 pub struct MeshImportOptions {
     /// Length of the unit of the file, m (1e-3 for a file in millimetres); positive.
     pub scale: f64,
-    /// True if z is up in the file. Otherwise y is up, and the mesh is rotated.
-    pub z_up: bool,
+    /// True if z is up in the file, and false if y is, so that the mesh is rotated. `None`: y for glTF, which says so,
+    /// and z for other formats.
+    pub z_up: Option<bool>,
 }
 
 /// Formats of mesh files that are read.
@@ -42,6 +46,12 @@ pub enum MeshImportError {
     Scale(f64),
     #[error("uses {0}; export plain triangles into one .glb file")]
     Unsupported(&'static str),
+    #[error("uses {extension}; {fix}")]
+    Extended { extension: String, fix: &'static str },
+    #[error(
+        "mesh {mesh} has a morph target of weight {weight}, which is not applied; apply the shape keys, and export it again"
+    )]
+    Morphed { mesh: usize, weight: f32 },
     #[error("the header declares {declared} bytes, but the file has {actual}; export it again")]
     Length { declared: usize, actual: usize },
     #[error("mesh {mesh}: accessor {attribute} {found}; glTF requires {required}; export the mesh again")]
@@ -62,6 +72,10 @@ impl MeshFormat {
             "obj" => Ok(Self::Obj),
             "stl" => Ok(Self::Stl),
             "glb" => Ok(Self::Gltf),
+            "gltf" => Err(MeshImportError::Extended {
+                extension: "files beside it (.gltf)".to_owned(),
+                fix: "pack it with the command: npx @gltf-transform/cli copy in.gltf out.glb",
+            }),
             other => Err(MeshImportError::Extension(other.to_owned())),
         }
     }
@@ -131,7 +145,11 @@ pub fn import_colours(
     }
 }
 
-/// Reads a mesh from the bytes of a file, in metres with z up. All objects of the file are merged into one mesh.
+/// Reads a mesh from the bytes of a file, in metres with z up. All objects of the file are merged into one mesh; of a
+/// glTF file those of its default scene, or else of its first.
+///
+/// Lines, points and curves of OBJ files are ignored. Text is UTF-8, UTF-16 with a byte order mark, or else Latin-1.
+/// A binary STL file whose count of triangles is too small is read to its end.
 ///
 /// [`import_colours`] reads its materials. [`Shape::from_mesh`](super::shape::Shape::from_mesh) turns a closed mesh
 /// into a solid.
@@ -148,13 +166,14 @@ pub fn import(
     }
     let mut mesh = match format {
         MeshFormat::Obj => obj::read(bytes)?,
-        MeshFormat::Stl => read_stl(bytes)?,
+        MeshFormat::Stl => stl::read(bytes)?,
         MeshFormat::Gltf => glb::read(bytes)?,
     };
     check_size(mesh.vertices.len(), mesh.triangles.len())?;
+    let is_z_up = options.z_up.unwrap_or(format != MeshFormat::Gltf);
     // From y up to z up: a quarter turn about x.
     let upright =
-        if options.z_up { Mat3::identity() } else { Mat3::new(1.0, 0.0, 0.0, 0.0, 0.0, -1.0, 0.0, 1.0, 0.0) };
+        if is_z_up { Mat3::identity() } else { Mat3::new(1.0, 0.0, 0.0, 0.0, 0.0, -1.0, 0.0, 1.0, 0.0) };
     mesh.vertices.iter_mut().for_each(|v| *v = upright * *v * options.scale);
     mesh.validate()?;
     Ok(mesh)
@@ -179,34 +198,4 @@ fn shortened(name: &str) -> String {
 fn plain_id(count: usize) -> Result<u16, String> {
     let most = u16::MAX;
     u16::try_from(count).map_err(|_| format!("has {count} materials; at most {most} are drawn, merge some"))
-}
-
-/// Bytes before the triangles of a binary STL file, the last four of which count them, and of a triangle.
-const STL_HEADER: usize = 84;
-const STL_TRIANGLE: usize = 50;
-
-/// Checks the length of a binary STL file. Text files begin with a word.
-fn check_stl_length(bytes: &[u8]) -> Result<(), MeshImportError> {
-    if bytes.starts_with(b"solid") {
-        return Ok(());
-    }
-    let count = bytes.get(STL_HEADER - 4..).and_then(|rest| rest.first_chunk());
-    let Some(count) = count.map(|count| u32::from_le_bytes(*count) as usize) else {
-        let reason = "it neither begins with \"solid\" nor has the header of a binary file".to_owned();
-        return Err(MeshImportError::Unreadable { format: "STL", reason });
-    };
-    let (declared, actual) = (STL_HEADER + STL_TRIANGLE * count, bytes.len());
-    if declared == actual { Ok(()) } else { Err(MeshImportError::Length { declared, actual }) }
-}
-
-fn read_stl(bytes: &[u8]) -> Result<Mesh, MeshImportError> {
-    check_stl_length(bytes)?;
-    let read = stl_io::read_stl(&mut Cursor::new(bytes))
-        .map_err(|error| MeshImportError::Unreadable { format: "STL", reason: error.to_string() })?;
-    let place = |v: &stl_io::Vertex| Vec3::new(f64::from(v[0]), f64::from(v[1]), f64::from(v[2]));
-    Ok(Mesh {
-        vertices: read.vertices.iter().map(place).collect(),
-        triangles: read.faces.iter().map(|face| face.vertices.map(|v| v as u32)).collect(),
-        uvs: Vec::new(),
-    })
 }

@@ -3,11 +3,15 @@
 
 use std::{cell::RefCell, collections::BTreeSet, io::Cursor};
 
-use super::{ImportedColours, ImportedImage, ImportedMaterial, MeshImportError, plain_id, shortened};
+use super::{
+    ImportedColours, ImportedImage, ImportedMaterial, MeshImportError, plain_id, polygon, shortened,
+    text::{decoded, numbered_lines},
+};
 use crate::{Vec3, mesh::Mesh};
 
+// The crate cuts polygons as fans, which is right for convex ones only.
 const OBJ_OPTIONS: tobj::LoadOptions =
-    tobj::LoadOptions { single_index: true, triangulate: true, ignore_points: false, ignore_lines: false };
+    tobj::LoadOptions { single_index: true, triangulate: false, ignore_points: true, ignore_lines: true };
 
 pub(super) fn colours(
     bytes: &[u8],
@@ -17,7 +21,7 @@ pub(super) fn colours(
     let libraries = RefCell::new(Vec::new());
     let load = |path: &std::path::Path| {
         let path = path.to_string_lossy();
-        let read = read_file(&path).and_then(|bytes| read_materials(&path, &String::from_utf8_lossy(&bytes)));
+        let read = read_file(&path).and_then(|bytes| read_materials(&path, &bytes));
         let materials = read.map_err(|error| {
             problem.borrow_mut().get_or_insert(error);
             tobj::LoadError::MaterialParseError
@@ -27,7 +31,7 @@ pub(super) fn colours(
         libraries.borrow_mut().push(MaterialLibrary { path: path.into_owned(), names });
         Ok((materials, ids))
     };
-    let text = normalised(bytes);
+    let text = normalised(bytes)?;
     let loaded = tobj::load_obj_buf(&mut Cursor::new(&text), &OBJ_OPTIONS, load);
     let (models, materials) = loaded.map_err(|error| error.to_string())?;
     if let Some(problem) = problem.into_inner() {
@@ -46,7 +50,7 @@ pub(super) fn colours(
     materials.push(ImportedMaterial::default());
     let ids = models.iter().flat_map(|model| {
         let id = model.mesh.material_id.map_or(plain, |id| id as u16);
-        std::iter::repeat_n(id, model.mesh.indices.len() / 3)
+        std::iter::repeat_n(id, triangles(&model.mesh).len())
     });
     Ok(ImportedColours { material_ids: ids.collect(), materials })
 }
@@ -88,7 +92,7 @@ fn check_material_names(obj: &str, libraries: &[MaterialLibrary]) -> Result<(), 
         let name = || line.trim().split_once(' ').map_or("", |(_, name)| name.trim());
         match line.split_whitespace().next() {
             Some("mtllib") => known += 1,
-            Some("usemtl") => {
+            Some("usemtl") if name() != NO_MATERIAL => {
                 let has = |library: &MaterialLibrary| library.names.contains(name());
                 if libraries.iter().take(known).any(has) {
                     continue;
@@ -112,14 +116,31 @@ fn check_material_names(obj: &str, libraries: &[MaterialLibrary]) -> Result<(), 
     Ok(())
 }
 
-/// The text of an OBJ file for the crate, which knows keywords in lower case before a space.
-fn normalised(bytes: &[u8]) -> String {
+/// Name in place of that of `usemtl` without one. No text has it.
+const NO_MATERIAL: &str = "\0";
+
+/// The text of an OBJ file for the crate, which knows keywords in lower case before a space, and lines that neither go
+/// on in the next one nor end in a comment. Lines keep their numbers. Polylines, of which it would make faces, are left
+/// out.
+fn normalised(bytes: &[u8]) -> Result<String, String> {
     let mut text = String::with_capacity(bytes.len());
-    for line in String::from_utf8_lossy(bytes).trim_start_matches(BYTE_ORDER_MARK).lines() {
-        let (keyword, rest) = keyword_and_rest(line);
-        text.extend([&keyword.to_ascii_lowercase(), " ", rest, "\n"]);
+    let decoded = decoded(bytes)?;
+    let mut written = 0;
+    for (number, line) in numbered_lines(&decoded) {
+        text.extend(std::iter::repeat_n('\n', number - 1 - written));
+        let (keyword, rest) = keyword_and_rest(&line);
+        let keyword = keyword.to_ascii_lowercase();
+        let rest = match &*keyword {
+            "l" => "",
+            "v" | "vt" | "vn" | "f" => rest.split('#').next().unwrap_or_default(),
+            "usemtl" if rest.is_empty() => NO_MATERIAL,
+            _ => rest,
+        };
+        let keyword = if keyword == "l" { "" } else { &keyword };
+        text.extend([keyword, " ", rest, "\n"]);
+        written = number;
     }
-    text
+    Ok(text)
 }
 
 /// Refuses a file that gives only some vertices colours (v x y z r g b): the crate takes those of others.
@@ -164,19 +185,17 @@ fn with_coordinates_everywhere(text: &str) -> String {
     all
 }
 
-/// Byte order mark, with which some editors begin a file.
-const BYTE_ORDER_MARK: char = '\u{feff}';
-
 fn keyword_and_rest(line: &str) -> (&str, &str) {
     let line = line.trim();
     line.split_once(char::is_whitespace).map_or((line, ""), |(keyword, rest)| (keyword, rest.trim_start()))
 }
 
 /// The materials of the MTL file `path`, of which names, `Kd` and `map_Kd` matter.
-fn read_materials(path: &str, text: &str) -> Result<Vec<tobj::Material>, String> {
+fn read_materials(path: &str, bytes: &[u8]) -> Result<Vec<tobj::Material>, String> {
     let mut materials: Vec<tobj::Material> = Vec::new();
-    for (line, number) in text.trim_start_matches(BYTE_ORDER_MARK).lines().zip(1..) {
-        let (keyword, rest) = keyword_and_rest(line);
+    let text = decoded(bytes).map_err(|error| format!("{}: {error}", shortened(path)))?;
+    for (number, line) in numbered_lines(&text) {
+        let (keyword, rest) = keyword_and_rest(&line);
         let refuse = |problem: &str| Err(format!("{} line {number}: {problem}", shortened(path)));
         match (keyword.to_ascii_lowercase().as_str(), materials.last_mut()) {
             ("newmtl", _) if rest.is_empty() => return refuse("newmtl has no name; add it"),
@@ -233,15 +252,41 @@ fn material_of_mtl(material: tobj::Material) -> Result<ImportedMaterial, String>
     Ok(ImportedMaterial { albedo, image: image.map(ImportedImage::File), ..plain })
 }
 
+/// The triangles of the faces of a mesh, by indices of its vertices.
+fn triangles(mesh: &tobj::Mesh) -> Vec<[u32; 3]> {
+    if mesh.face_arities.is_empty() {
+        return mesh.indices.as_chunks().0.to_vec();
+    }
+    let mut rest = &*mesh.indices;
+    let mut triangles = Vec::new();
+    for count in &mesh.face_arities {
+        let (face, others) = rest.split_at(*count as usize);
+        let corners: Vec<Vec3> = face.iter().map(|vertex| position(mesh, *vertex)).collect();
+        triangles.extend(polygon::triangles(&corners).into_iter().map(|t| t.map(|corner| face[corner])));
+        rest = others;
+    }
+    triangles
+}
+
+fn position(mesh: &tobj::Mesh, vertex: u32) -> Vec3 {
+    let at = 3 * vertex as usize;
+    Vec3::from_fn(|axis, _| f64::from(mesh.positions[at + axis]))
+}
+
 pub(super) fn read(bytes: &[u8]) -> Result<Mesh, MeshImportError> {
     let unreadable = |reason: String| MeshImportError::Unreadable { format: "OBJ", reason };
     // Materials split meshes, which would change the order of vertices: [`colours`] reads them separately.
     let no_materials = |_: &std::path::Path| Err(tobj::LoadError::OpenFileFailed);
+    let try_load = |text: &str| tobj::load_obj_buf(&mut Cursor::new(text), &OBJ_OPTIONS, no_materials);
     let load = |text: &str| {
-        let loaded = tobj::load_obj_buf(&mut Cursor::new(text), &OBJ_OPTIONS, no_materials);
-        loaded.map(|(models, _)| models).map_err(|error| unreadable(error.to_string()))
+        try_load(text).map(|(models, _)| models).map_err(|error| {
+            // The crate does not say where: the first line that makes the text fail.
+            let ends: Vec<usize> = text.match_indices('\n').map(|(end, _)| end).collect();
+            let line = ends.partition_point(|end| try_load(&text[..*end]).is_ok()) + 1;
+            unreadable(format!("line {line}: {error}"))
+        })
     };
-    let text = normalised(bytes);
+    let text = normalised(bytes).map_err(unreadable)?;
     check_vertex_colours(&text).map_err(unreadable)?;
     let mut models = load(&text)?;
     // The crate lists the coordinates of those that have some, without telling which.
@@ -261,10 +306,9 @@ pub(super) fn read(bytes: &[u8]) -> Result<Mesh, MeshImportError> {
     let textured = models.iter().any(|model| !model.mesh.texcoords.is_empty());
     for tobj::Model { mesh, .. } in &models {
         let base = out.vertices.len() as u32;
-        let place = |p: &[f32]| Vec3::new(f64::from(p[0]), f64::from(p[1]), f64::from(p[2]));
-        out.vertices.extend(mesh.positions.chunks_exact(3).map(place));
-        for t in mesh.indices.chunks_exact(3) {
-            out.triangles.push([t[0] + base, t[1] + base, t[2] + base]);
+        out.vertices.extend((0..mesh.positions.len() as u32 / 3).map(|vertex| position(mesh, vertex)));
+        for t in triangles(mesh) {
+            out.triangles.push(t.map(|vertex| vertex + base));
             if textured {
                 let uv = |v: u32| {
                     let at = 2 * v as usize;

@@ -9,7 +9,7 @@ use sha2::{Digest, Sha256};
 
 use super::combine::SignedDistance;
 use crate::{
-    Vec3,
+    Aabb, Vec3,
     mesh::{Mesh, MeshError},
     mesh_overlap::check_pieces,
     parry::{from_parry, to_parry},
@@ -68,10 +68,27 @@ fn digest(mesh: &Mesh) -> String {
     format!("{:x}", hash.finalize())
 }
 
+/// Distances within which the vertices of a mesh that is open are one, in diagonals of its bounding box: formats without
+/// indices round each corner of a triangle by itself. The least that closes the mesh spoils the fewest small triangles.
+const WELDING: [f64; 2] = [1e-8, 1e-6];
+
+/// A mesh with one vertex at each place, and the indices of the triangles that were kept.
+fn welded(mesh: &Mesh) -> (Mesh, Vec<u32>) {
+    let diagonal = Aabb::from_points(&mesh.vertices).map_or(0.0, |bounds| bounds.size().norm());
+    let mut welded = mesh.welded_keeping();
+    for distance in WELDING {
+        if !matches!(welded.0.validate_closed(), Err(MeshError::Open { .. })) {
+            break;
+        }
+        welded = mesh.snapped(distance * diagonal).welded_keeping();
+    }
+    welded
+}
+
 impl MeshSolid {
     pub(super) fn new(mesh: Mesh) -> Result<Self, MeshError> {
         mesh.validate()?;
-        let (mut mesh, sources) = mesh.welded_keeping();
+        let (mut mesh, sources) = welded(&mesh);
         mesh.validate()?;
         mesh.validate_closed()?;
         let volume = mesh.volume();

@@ -1,5 +1,6 @@
 //! Tests of shapes and meshes against closed forms and the exact mesh distance of parry.
 
+mod foreign_files;
 mod import;
 mod meshes;
 mod shapes;

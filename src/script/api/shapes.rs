@@ -344,13 +344,15 @@ functions! {
         /// Reads a shape from an OBJ, STL or GLB file: `softvt.mesh { file = "mug.obj", scale = 0.001 }`. The surface
         /// must be closed. An asset without visuals has the colours and images of the materials in the file: Kd and
         /// map_Kd of the MTL files that an OBJ file names, or the base colours of a GLB file; images are PNG or JPEG.
+        /// All objects of the file are one shape; of a GLB file those of its default scene. Vertices within 1e-6 of the
+        /// diagonal are one where the surface is open without that.
         fn mesh(lua) takes spec "softvt.MeshSpec" {
             /// Path inside of the project, next to the Lua file or from a root folder.
             file: String;
             /// Metres per unit of the file: 0.001 for millimetres.
             scale: f64 = LENGTH => Number(1.0);
-            /// True if z is up in the file; otherwise y is.
-            z_up: bool => Boolean(true);
+            /// True if z is up in the file, false if y is. By default y in a GLB file, as glTF says, and z in others.
+            z_up: Option<bool>;
         } -> ["softvt.Shape"] {
             let requester = current_line(lua).map(|line| line.file);
             let library = app_data::<SharedLibrary>(lua)?;
