@@ -69,6 +69,28 @@ fn pictures_and_films_are_the_same_without_a_cache_and_with_a_new_an_old_and_a_d
 }
 
 #[test]
+fn a_large_image_of_a_mesh_file_is_scaled_down_once() {
+    let script = "local shape = softvt.mesh { file = 'm.obj' }\n\
+                  return softvt.experiment { name = 'v', grid = { a = { 1 } }, run = function() return { v = shape:volume() } end }";
+    let obj = "mtllib m.mtl\nusemtl m\nv 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nvt 0 0\n\
+               f 1/1 3/1 2/1\nf 1/1 2/1 4/1\nf 1/1 4/1 3/1\nf 2/1 3/1 4/1\n";
+    let project = Project::new(&[("x.lua", script), ("m.obj", obj), ("m.mtl", "newmtl m\nmap_Kd m.png\n")]);
+    image::RgbImage::new(2500, 1000).save(project.path("m.png")).expect("written");
+    let age = || {
+        let files = fs::read_dir(project.path("kept")).expect("a folder").map(|file| file.expect("a file"));
+        let images: Vec<_> =
+            files.filter(|file| file.file_name().to_string_lossy().starts_with("image-")).collect();
+        assert_eq!(images.len(), 1);
+        let used = images[0].metadata().and_then(|file| file.modified()).expect("a time");
+        used.elapsed().unwrap_or_default().as_secs() / 3600
+    };
+    succeeds(&project, "kept", "x.lua");
+    assert_eq!(age(), 24, "new entries begin a day old");
+    succeeds(&project, "kept", "x.lua");
+    assert_eq!(age(), 0, "the second command reads it");
+}
+
+#[test]
 fn two_processes_share_a_new_cache() {
     let project = short();
     let outs = ["first", "second"];

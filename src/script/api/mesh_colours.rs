@@ -6,16 +6,17 @@ use std::{
     sync::Arc,
 };
 
-use image::{ImageReader, Limits, imageops::FilterType};
+use image::{ImageReader, Limits};
 use mlua::Lua;
 
 use crate::vm::memory_budget::{Reservation, reserve};
-use softvt_common::text::shortened;
+use softvt_common::{disk_cache::DiskCache, text::shortened};
 use softvt_geometry::{
     import::{ImportedColours, ImportedImage},
     shape::{MeshSolid, Shape},
 };
 use softvt_scene::{ColouredMesh, MeshColours, MeshMaterial, SurfaceImage, Visual};
+use softvt_sensing::camera::resize;
 
 /// Colours of a mesh file, for an asset without visuals of its own.
 #[derive(Debug)]
@@ -179,22 +180,22 @@ impl<'a> Images<'a> {
         // Before it is decoded, which takes little more for one image at a time.
         let longest = width.max(height);
         let kept = |edge: u32| (edge * KEPT_EDGE).div_ceil(longest.max(KEPT_EDGE));
-        let kept = SurfaceImage::bytes(kept(width), kept(height));
-        let reserved = reserve(self.lua, kept);
+        let reserved = reserve(self.lua, SurfaceImage::bytes(kept(width), kept(height)));
         self.reserved.push(reserved.map_err(|_| {
             format!(
                 "{name}: {width} × {height} pixels do not fit into the memory of images, shapes and masks; scale it \
                  down or use fewer images"
             )
         })?);
-        let decoded =
-            reader(u64::from(width) * u64::from(height))?.decode().map_err(|error| unreadable(&error))?;
-        let kept = match longest > KEPT_EDGE {
-            true => decoded.resize(KEPT_EDGE, KEPT_EDGE, FilterType::Triangle),
-            false => decoded,
-        };
-        let kept = kept.to_rgb8();
-        Ok(SurfaceImage::new(kept.width(), kept.as_raw()))
+        let pixels = u64::from(width) * u64::from(height);
+        let decode = || Ok(reader(pixels)?.decode().map_err(|error| unreadable(&error))?.into_rgb8());
+        if longest <= KEPT_EDGE {
+            return Ok(SurfaceImage::new(width, &decode()?));
+        }
+        let (width, height) = (kept(width), kept(height));
+        let reduce = || Ok(resize(&decode()?, width, height).into_raw());
+        let pixels = DiskCache::default().get("image", &bytes, reduce)?;
+        Ok(SurfaceImage::new(width, &pixels))
     }
 }
 
@@ -268,6 +269,20 @@ mod tests {
         };
         assert!(Arc::ptr_eq(&a, &b));
         assert_eq!(roughness, Some(0.2), "three faces of area 1/2 each against one of 0.87");
+    }
+
+    #[test]
+    fn a_large_image_is_kept_at_the_largest_edge() {
+        let imported = |edge| {
+            let read = move |_: &str| Ok(png(edge));
+            let imported =
+                ImportedColours { materials: vec![textured("a.png", 0.5)], material_ids: vec![0; 4] };
+            let colours = FileColours::new(&lua(), imported, &tetrahedron(), &read).expect("an image");
+            format!("{:?}", colours.expect("materials").mesh.materials[0].image)
+        };
+        for (edge, kept) in [(KEPT_EDGE, KEPT_EDGE), (KEPT_EDGE + 1, KEPT_EDGE), (4096, KEPT_EDGE)] {
+            assert_eq!(imported(edge), format!("Some(SurfaceImage({kept} × {kept}))"));
+        }
     }
 
     #[test]
