@@ -401,11 +401,11 @@
 ---@field yaw? number Rotation of the downward hand about the vertical, by default 0. Expects radians in -6.2832..6.2832.
 ---@field quaternion? number[] Orientation instead of yaw. Expects a list of 4 numbers (w, x, y, z).
 
----Reads a shape from an OBJ, STL or GLB file: `softvt.mesh { file = "mug.obj", scale = 0.001 }`. The surface must be closed. An asset without visuals has the colours and images of the materials in the file: Kd and map_Kd of the MTL files that an OBJ file names, or the base colours of a GLB file; images are PNG or JPEG.
+---Reads a shape from an OBJ, STL or GLB file: `softvt.mesh { file = "mug.obj", scale = 0.001 }`. The surface must be closed. An asset without visuals has the colours and images of the materials in the file: Kd and map_Kd of the MTL files that an OBJ file names, or the base colours of a GLB file; images are PNG or JPEG. All objects of the file are one shape; of a GLB file those of its default scene. Vertices within 1e-6 of the diagonal are one where the surface is open without that.
 ---@class softvt.MeshSpec
 ---@field file string Path inside of the project, next to the Lua file or from a root folder.
 ---@field scale? number Metres per unit of the file: 0.001 for millimetres. Expects metres above 0. Default 1.
----@field z_up? boolean True if z is up in the file; otherwise y is. Default true.
+---@field z_up? boolean True if z is up in the file, false if y is. By default y in a GLB file, as glTF says, and z in others.
 
 ---An option of the script: key gap_mm is --gap-mm on the command line. The default determines the type.
 ---@class softvt.Option
@@ -1943,7 +1943,7 @@ function softvt.plot(spec) end
 ---@return softvt.Pose
 function softvt.pose(spec) end
 
----Reads a shape from an OBJ, STL or GLB file: `softvt.mesh { file = "mug.obj", scale = 0.001 }`. The surface must be closed. An asset without visuals has the colours and images of the materials in the file: Kd and map_Kd of the MTL files that an OBJ file names, or the base colours of a GLB file; images are PNG or JPEG.
+---Reads a shape from an OBJ, STL or GLB file: `softvt.mesh { file = "mug.obj", scale = 0.001 }`. The surface must be closed. An asset without visuals has the colours and images of the materials in the file: Kd and map_Kd of the MTL files that an OBJ file names, or the base colours of a GLB file; images are PNG or JPEG. All objects of the file are one shape; of a GLB file those of its default scene. Vertices within 1e-6 of the diagonal are one where the surface is open without that.
 ---@param spec softvt.MeshSpec
 ---@return softvt.Shape
 function softvt.mesh(spec) end

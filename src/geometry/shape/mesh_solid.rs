@@ -68,7 +68,7 @@ fn digest(mesh: &Mesh) -> String {
     format!("{:x}", hash.finalize())
 }
 
-/// Distances within which the vertices of a mesh that is open are one, in diagonals of its bounding box: formats without
+/// Distances within which the vertices of an open mesh are one, in diagonals of its bounding box: files without
 /// indices round each corner of a triangle by itself. The least that closes the mesh spoils the fewest small triangles.
 const WELDING: [f64; 2] = [1e-8, 1e-6];
 

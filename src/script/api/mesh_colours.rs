@@ -188,12 +188,14 @@ impl<'a> Images<'a> {
             )
         })?);
         let pixels = u64::from(width) * u64::from(height);
-        let decode = || Ok(reader(pixels)?.decode().map_err(|error| unreadable(&error))?.into_rgb8());
+        let decode = || -> Result<_, String> {
+            Ok(reader(pixels)?.decode().map_err(|error| unreadable(&error))?.into_rgb8())
+        };
         if longest <= KEPT_EDGE {
             return Ok(SurfaceImage::new(width, &decode()?));
         }
         let (width, height) = (kept(width), kept(height));
-        let reduce = || Ok(resize(&decode()?, width, height).into_raw());
+        let reduce = || Ok::<_, String>(resize(&decode()?, width, height).into_raw());
         let pixels = DiskCache::default().get("image", &bytes, reduce)?;
         Ok(SurfaceImage::new(width, &pixels))
     }
