@@ -348,11 +348,15 @@ class Environments(unittest.TestCase):
         page = (Path(__file__).resolve().parents[3] / "docs/python.md").read_text(encoding="utf-8")
         stated = int(re.search(r"equal steps in a row cover (\d+) % of their length", page).group(1))
         env = self.make("object_soft", obs="proprio", control="delta")
-        env.reset(seed=1000)
-        rest, step = (np.array([0, y, 0, 0, 0, 0, -1.0]) for y in (0, 1))
-        start = [env.step(rest)[0] for _ in range(5)][-1]
-        end = [env.step(step)[0] for _ in range(10)][-1]
-        self.assertAlmostEqual(100 * (end[1] - start[1]) / 0.2, stated, delta=1)
+        # Along y, and about x by the half of the largest turn, by which no joint is at its speed limit.
+        for number, fraction, whole in [(1, 1.0, 0.02), (3, 0.5, 0.2)]:
+            env.reset(seed=1000)
+            step = np.array([0, 0, 0, 0, 0, 0, -1.0])
+            start = [env.step(step)[0] for _ in range(5)][-1]
+            step[number] = fraction
+            end = [env.step(step)[0] for _ in range(10)][-1]
+            with self.subTest(number):
+                self.assertAlmostEqual(100 * (end - start)[number] / (10 * fraction * whole), stated, delta=1)
 
     def test_after_an_interrupted_step_a_vector_is_reset(self):
         envs = softvt.SoftVTVectorEnv(2, script=short_suite(), obs="proprio")
