@@ -280,6 +280,18 @@ impl Envelope {
         }
     }
 
+    /// The envelope that follows from the rows of this one, of which those that are not [intact](SweepRow::instability)
+    /// are not stable.
+    pub(crate) fn recomputed(&self, kappa: f64) -> Self {
+        let Self { protocol, stable_strain, censored, holds, sweep, variants, .. } = self.clone();
+        let is_stable = |row: &SweepRow| row.stable && row.instability().is_none();
+        let sweep = sweep.into_iter().map(|row| SweepRow { stable: is_stable(&row), ..row }).collect();
+        Self::new(
+            CalibrationMeasurements { protocol, stable_strain, ended: censored, holds, sweep, variants },
+            kappa,
+        )
+    }
+
     /// True if D of the carried object passes τ at every width.
     pub fn exceeds_when_carried(&self, limit: DeformationLimit) -> bool {
         self.carried_d_pct.is_some_and(|d_pct| d_pct > limit.tau_pct())

@@ -7,6 +7,7 @@
 use std::{collections::BTreeMap, path::Path};
 
 use serde::{Deserialize, Serialize};
+use serde_json::{Value, json};
 
 use super::{
     calibration::{Envelope, SweepProtocol},
@@ -22,6 +23,8 @@ pub const RELEASED_SCHEMA_VERSION: u32 = 1;
 pub const PROTOCOL_ID: &str = "softvtbench-v1";
 /// The only calibration method that is accepted.
 pub const METHOD: &str = "compression_sweep";
+/// Differences of results from those of their rows that rounding to six decimals explains, relative to 1.
+const ROUNDING: f64 = 1.5e-6;
 
 /// Reasons why a threshold file cannot be used.
 #[derive(Debug, thiserror::Error)]
@@ -35,6 +38,10 @@ pub enum ThresholdError {
     Incompatible { path: String, field: &'static str, got: String, expected: String },
     #[error("{path}: thresholds.{asset}.{field} is {value}, expected {expected}")]
     Range { path: String, asset: String, field: &'static str, value: f64, expected: &'static str },
+    #[error(
+        "{path}: {field} is {stated}, and the rows of its sweep and hold trials give {computed}: calibrate the asset again"
+    )]
+    Contradiction { path: String, field: String, stated: String, computed: String },
 }
 
 /// Provenance of the thresholds.
@@ -190,9 +197,12 @@ impl ThresholdFile {
     /// Parses the text of a threshold file; `path` names it in errors.
     ///
     /// # Errors
-    /// Invalid JSON, another metric, protocol, schema or method, or numbers out of range.
+    /// Invalid JSON, another metric, protocol, schema or method, numbers out of range, or limits and windows that do
+    /// not follow from the rows of the file.
     pub fn parse(text: &str, path: &str) -> Result<Self, ThresholdError> {
-        Self::parse_as(text, path, METRIC_ID, SCHEMA_VERSION)
+        let file = Self::parse_as(text, path, METRIC_ID, SCHEMA_VERSION)?;
+        file.check_rows(path)?;
+        Ok(file)
     }
 
     /// Parses a file of [`ThresholdFile::released`], as [`ThresholdFile::parse`] does.
@@ -210,12 +220,12 @@ impl ThresholdFile {
         schema_version: u32,
     ) -> Result<Self, ThresholdError> {
         let json = |source| ThresholdError::Json { path: path.into(), source };
-        let value: serde_json::Value = serde_json::from_str(text).map_err(json)?;
+        let value: Value = serde_json::from_str(text).map_err(json)?;
         // First of all: for a file of another metric the error should say that, not that some field is missing.
         if let Some(metric) = value.get("metric_id").and_then(|m| m.as_str()) {
             check_equal(path, "metric_id", metric, metric_id)?;
         }
-        if let Some(version) = value.get("schema_version").and_then(serde_json::Value::as_u64) {
+        if let Some(version) = value.get("schema_version").and_then(Value::as_u64) {
             check_equal(path, "schema_version", &version.to_string(), &schema_version.to_string())?;
         }
         let file: Self = serde_json::from_value(value).map_err(json)?;
@@ -236,27 +246,52 @@ impl ThresholdFile {
 
     /// Text of the file: indented JSON with a final newline, thresholds with at most six decimals.
     pub fn to_text(&self) -> String {
-        format!("{:#}\n", serde_json::json!(self))
+        format!("{:#}\n", json!(self))
     }
 
     fn validate(&self, path: &str) -> Result<(), ThresholdError> {
         check_equal(path, "protocol_id", &self.protocol_id, PROTOCOL_ID)?;
         check_equal(path, "calibration.method", &self.calibration.method, METHOD)?;
-        self.thresholds.iter().try_for_each(|(asset, threshold)| {
-            threshold.validate(path, asset)?;
-            let envelope = self.envelopes.get(asset).and_then(|envelope| envelope.d_ref_pct);
-            match envelope.is_some_and(|d_ref| (d_ref - threshold.d_ref).abs() > 1.5e-6) {
-                true => Err(ThresholdError::Range {
-                    path: path.into(),
-                    asset: asset.clone(),
-                    field: "d_ref",
-                    value: threshold.d_ref,
-                    expected: "d_ref_pct of its envelope",
-                }),
-                false => Ok(()),
-            }
-        })
+        self.thresholds.iter().try_for_each(|(asset, threshold)| threshold.validate(path, asset))
     }
+
+    /// Checks that limits and windows are those that follow from the rows.
+    fn check_rows(&self, path: &str) -> Result<(), ThresholdError> {
+        let mut computed = Self { thresholds: BTreeMap::new(), envelopes: BTreeMap::new(), ..self.clone() };
+        for (asset, envelope) in &self.envelopes {
+            computed.calibration.kappa =
+                self.thresholds.get(asset).map_or(self.calibration.kappa, |own| own.kappa);
+            computed.insert(asset, envelope.recomputed(computed.calibration.kappa));
+        }
+        let results = |file: &Self| json!({ "thresholds": file.thresholds, "envelopes": file.envelopes });
+        let Some((field, stated, computed)) = first_difference(&results(self), &results(&computed)) else {
+            return Ok(());
+        };
+        let [stated, computed] = [stated, computed].map(|value| value.to_string());
+        Err(ThresholdError::Contradiction { path: path.into(), field, stated, computed })
+    }
+}
+
+/// The first value in which two documents differ by more than rounding: its path, and both values.
+fn first_difference(a: &Value, b: &Value) -> Option<(String, Value, Value)> {
+    let entries = |value: &Value| -> BTreeMap<String, Value> {
+        let fields = value.as_object().into_iter().flatten().map(|(key, value)| (key.clone(), value.clone()));
+        let items = value.as_array().into_iter().flatten().enumerate();
+        fields.chain(items.map(|(at, value)| (at.to_string(), value.clone()))).collect()
+    };
+    if let Some((x, y)) = a.as_f64().zip(b.as_f64()) {
+        let is_rounding = (x - y).abs() <= ROUNDING * (1.0 + y.abs());
+        return (!is_rounding).then(|| (String::new(), a.clone(), b.clone()));
+    }
+    let (own, other) = (entries(a), entries(b));
+    if own.is_empty() || other.is_empty() {
+        return (a != b).then(|| (String::new(), a.clone(), b.clone()));
+    }
+    own.keys().chain(other.keys()).find_map(|key| {
+        let of = |entries: &BTreeMap<String, Value>| entries.get(key).cloned().unwrap_or_default();
+        let (path, x, y) = first_difference(&of(&own), &of(&other))?;
+        Some((if path.is_empty() { key.clone() } else { format!("{key}.{path}") }, x, y))
+    })
 }
 
 impl AssetThreshold {
@@ -299,7 +334,7 @@ fn check_equal(path: &str, field: &'static str, got: &str, expected: &str) -> Re
 /// SoftVTBench's files it is the opening, 1 open and 0 closed.
 pub fn sweep_jsonl(asset: &str, envelope: &Envelope) -> String {
     let rows = envelope.sweep.iter().enumerate().map(|(level, row)| {
-        serde_json::json!({
+        json!({
             "asset": asset,
             "level": level,
             "gripper_width_mm": row.width_mm,
@@ -371,16 +406,42 @@ mod tests {
             "envelopes in closures: {first}"
         );
         assert!(refused("0.166667", "0.3").contains("thresholds.bun.tau is 0.3"));
-        let envelope = refused("\"d_ref_pct\": 0.333333", "\"d_ref_pct\": 0.2");
-        assert!(
-            envelope.contains("thresholds.bun.d_ref is 0.333333, expected d_ref_pct of its envelope"),
-            "{envelope}"
-        );
         assert!(refused("\"d_ref\": 0.333333", "\"d_ref\": -1").contains("thresholds.bun.d_ref is -1"));
         assert!(refused("\"n_stable_trials\": 2", "\"n_stable_trials\": 0").contains("n_stable_trials is 0"));
         assert!(refused("{", "").contains("not a threshold file"));
         let missing = ThresholdFile::read_released(Path::new("/nowhere/bun.json")).unwrap_err().to_string();
         assert!(missing.starts_with("/nowhere/bun.json: "), "{missing}");
+    }
+
+    #[test]
+    fn a_file_whose_limits_do_not_follow_from_its_rows_is_refused() {
+        let refused = |change: &dyn Fn(&mut ThresholdFile)| {
+            let mut file = file();
+            change(&mut file);
+            ThresholdFile::parse(&file.to_text(), "bun.json")
+                .map_or_else(|e| e.to_string(), |_| String::new())
+        };
+        assert_eq!(refused(&|_| ()), "");
+        let loosened = refused(&|file| {
+            let bun = file.thresholds.get_mut("bun").unwrap();
+            (bun.tau, bun.d_ref) = (5.0, 10.0);
+            file.envelopes.get_mut("bun").unwrap().d_ref_pct = Some(10.0);
+        });
+        assert_eq!(
+            loosened,
+            "bun.json: envelopes.bun.d_ref_pct is 10.0, and the rows of its sweep and hold trials give 0.333333: calibrate \
+             the asset again"
+        );
+        let limit = refused(&|file| file.thresholds.get_mut("bun").unwrap().n_stable_trials = 7);
+        assert!(limit.contains("thresholds.bun.n_stable_trials is 7, and the rows"), "{limit}");
+        let window = refused(&|file| {
+            file.envelopes.get_mut("bun").unwrap().window.tight.width_mm = Some(40.0);
+        });
+        assert!(window.contains("envelopes.bun.window.width_at_tau_mm is 40.0"), "{window}");
+        let unstable = refused(&|file| file.envelopes.get_mut("bun").unwrap().sweep[1].min_det_f = 0.05);
+        assert!(unstable.contains("envelopes.bun.d_ref_pct is 0.333333"), "{unstable}");
+        let rows = refused(&|file| file.envelopes.clear());
+        assert!(rows.contains("bun.json: thresholds is {\"bun\":"), "{rows}");
     }
 
     #[test]

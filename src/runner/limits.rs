@@ -120,10 +120,12 @@ impl CalibrationFiles {
             return Ok(Err(MissingLimit::NotCalibrated { path: relative_path(&asset.name) }));
         };
         let path = file.path.clone();
-        // A file without a fingerprint is assumed to fit.
-        let calibrated = file.thresholds.fingerprints.get(&asset.name);
-        if calibrated.is_some_and(|calibrated| *calibrated != asset.fingerprint()) {
-            return Ok(Err(MissingLimit::OtherVersion { path }));
+        match file.thresholds.fingerprints.get(&asset.name) {
+            None => return Ok(Err(MissingLimit::NoFingerprint { path })),
+            Some(calibrated) if *calibrated != asset.fingerprint() => {
+                return Ok(Err(MissingLimit::OtherVersion { path }));
+            }
+            Some(_) => {}
         }
         if let Some(change) = object.departure() {
             return Ok(Err(MissingLimit::OtherObject { change }));
@@ -177,6 +179,7 @@ impl CalibrationFiles {
 #[derive(Debug)]
 enum MissingLimit {
     NotCalibrated { path: String },
+    NoFingerprint { path: String },
     OtherVersion { path: String },
     OtherObject { change: String },
     NoStableRow { path: String },
@@ -195,6 +198,9 @@ impl MissingLimit {
             Self::NotCalibrated { path } => {
                 format!("{name} is not calibrated (no {path}): {effect}; {calibrate}")
             }
+            Self::NoFingerprint { path } => format!(
+                "{path} has no fingerprint of {name:?}, so that it may be of a different version: {effect}; {calibrate}"
+            ),
             Self::OtherVersion { path } => format!(
                 "{path} was computed for a different version of {name:?} (its shape, material or friction differ): \
                  {effect}; {calibrate}"

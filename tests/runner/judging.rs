@@ -3,7 +3,12 @@
 use std::collections::BTreeSet;
 
 use softvt::{
-    evaluation::{stage::TaskStage, verdict::Verdict},
+    evaluation::{
+        calibration::{CalibrationMeasurements, Envelope, SweepProtocol, SweepRow},
+        stage::TaskStage,
+        thresholds::ThresholdFile,
+        verdict::Verdict,
+    },
     runner::TraceDetail,
 };
 
@@ -101,14 +106,30 @@ fn objects_are_supported_by_what_they_rest_on() {
     }
 }
 
-/// The calibration of a cube with a fingerprint.
+/// The calibration of a cube with a fingerprint, from one squeeze.
 fn calibration(fingerprint: &str) -> String {
-    format!(
-        r#"{{"schema_version":2,"protocol_id":"softvtbench-v1","metric_id":"fem_volume_rms_rigid_aligned_object_bbox_pct_v1",
-        "calibration":{{"method":"compression_sweep","definition":"d","kappa":0.5,"sources":[],"generated_at":"x"}},
-        "thresholds":{{"cube":{{"tau":1.0,"d_ref":2.0,"kappa":0.5,"n_stable_trials":3}}}},
-        "fingerprints":{{"cube":"{fingerprint}"}}}}"#
-    )
+    let squeeze = SweepRow {
+        width_mm: 38.0,
+        closure: None,
+        d_pct: 2.0,
+        d_v1_pct: None,
+        force_n: 1.0,
+        strain_p95: None,
+        min_det_f: 0.6,
+        node_speed_m_s: 0.0,
+        both_pads: true,
+        slip_mm: 0.0,
+        stable: true,
+    };
+    let scans = CalibrationMeasurements {
+        protocol: SweepProtocol::Hand,
+        sweep: vec![squeeze],
+        ..CalibrationMeasurements::default()
+    };
+    let mut file = ThresholdFile::new(0.5, Vec::new(), "x".to_owned());
+    assert!(file.insert("cube", Envelope::new(scans, 0.5)));
+    file.fingerprints.insert("cube".to_owned(), fingerprint.to_owned());
+    file.to_text()
 }
 
 /// A suite with a cube of the given stiffness (Pa), a shift of it, and an experiment that returns its fingerprint.
@@ -253,9 +274,17 @@ fn impostor(fingerprint: &str) -> Project {
 #[test]
 fn limits_of_other_versions_are_ignored() {
     let told = |project: &Project| project.run("x.lua").policy("noop").out("run").finish().messages;
-    let messages = told(&impostor("0123456789abcdef"));
+    let project = impostor("0123456789abcdef");
+    let messages = told(&project);
     let other = "assets/calibration/cube.json was computed for a different version of \"cube\"";
     assert!(messages.contains(other), "{messages}");
+    let mut file = project.json("assets/calibration/cube.json");
+    file.as_object_mut().expect("a document").remove("fingerprints");
+    let project = Small::default().project();
+    project.write("assets/calibration/cube.json", file.to_string().as_bytes());
+    let messages = told(&project);
+    let unknown = "assets/calibration/cube.json has no fingerprint of \"cube\", so that it may be of a different version";
+    assert!(messages.contains(unknown), "{messages}");
     let script = r#"return softvt.experiment { name = "who", grid = { x = { 1 } }, run = function()
   local cube = softvt.asset { name = "cube", shape = softvt.shape.box { size = { 0.04, 0.04, 0.04 } }:grounded(),
     body = softvt.soft { youngs_pa = 2e4, poisson = 0.3, density = 300 } }
