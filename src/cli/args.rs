@@ -135,7 +135,7 @@ impl Request {
     /// A shift or setting that is not `NAME=VALUE`, or a seed file that cannot be read.
     pub(crate) fn new(script: ScriptArgs) -> Result<Self, CliError> {
         let observer = Arc::new(Console::default());
-        let secret = script.seed_file.as_deref().map(|path| read_secret(path, &*observer)).transpose()?;
+        let secret = script.seed_file.as_deref().map(read_secret).transpose()?;
         let in_file = |error: CliError| error.prefixed(script.file.display());
         let shifts = script.shifts.iter().map(|word| parse_shift(word)).collect::<Result<_, _>>();
         let settings = script.settings.iter().map(|word| parse_pair("--set", word)).collect::<Result<_, _>>();

@@ -21,7 +21,7 @@ use softvt_benchmark::{
     run_changes::{RunChanges, Twin},
     seed::SecretSeed,
 };
-use softvt_common::{cancel, parallel};
+use softvt_common::{cancel, parallel, text::counted};
 use softvt_script::LoadedScript;
 
 /// Detail of the trace of an episode.
@@ -324,16 +324,16 @@ impl RunConfig {
     }
 }
 
-/// Shortest seed file that is not easily guessed from its hash, bytes.
+/// Shortest seed file, bytes: a shorter one is easily guessed from its hash.
 const MIN_SECRET_BYTES: usize = 16;
 /// Largest size of the file.
 const MAX_SECRET_BYTES: u64 = 1 << 20;
 
-/// The secret in a seed file. Warns of one that is easily guessed.
+/// The secret in a seed file.
 ///
 /// # Errors
-/// The file cannot be read, or is empty.
-pub fn read_secret(path: &Path, observer: &dyn Observer) -> Result<SecretSeed, RunError> {
+/// The file cannot be read, or has less than 16 bytes, so that its hash in the results would give it away.
+pub fn read_secret(path: &Path) -> Result<SecretSeed, RunError> {
     let refuse = |what: String| RunError::of_setting("secret", path.display(), what);
     let make = "write one, for example: head -c 32 /dev/urandom > FILE";
     let mut content = Vec::new();
@@ -347,15 +347,9 @@ pub fn read_secret(path: &Path, observer: &dyn Observer) -> Result<SecretSeed, R
     if content.len() as u64 > MAX_SECRET_BYTES {
         return Err(refuse(format!("it has more than {MAX_SECRET_BYTES} bytes; {make}")));
     }
-    if content.is_empty() {
-        return Err(refuse(format!("the file is empty; {make}")));
-    }
     if content.len() < MIN_SECRET_BYTES {
-        observer.notice(&format!(
-            "warning: the seed file {}: {} bytes may be guessed from their hash in the results; {make}",
-            path.display(),
-            content.len()
-        ));
+        let bytes = counted(content.len(), "byte");
+        return Err(refuse(format!("{bytes} may be guessed from their hash in the results; {make}")));
     }
     Ok(SecretSeed::new(&content))
 }

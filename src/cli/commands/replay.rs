@@ -43,9 +43,10 @@ pub(crate) struct ReplayArgs {
 pub(super) fn run(args: &ReplayArgs) -> Result<(), CliError> {
     let dir = &args.run;
     let observer: Arc<dyn Observer> = Arc::new(Console::default());
-    let secret = args.seed_file.as_ref().map(|path| {
-        Ok::<_, CliError>(SecretFile { path: path.clone(), secret: read_secret(path, &*observer)? })
-    });
+    let secret = args
+        .seed_file
+        .as_ref()
+        .map(|path| Ok::<_, CliError>(SecretFile { path: path.clone(), secret: read_secret(path)? }));
     let secret = secret.transpose()?;
     if is_dataset(dir) {
         if secret.is_some() {
