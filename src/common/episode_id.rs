@@ -30,7 +30,7 @@ impl EpisodeId {
 
 /// Position of an episode in a run of a suite. Suite, base seed and split of an [`EpisodeId`] are properties of the
 /// run; within it this pair suffices as a key and names the files of the episode.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 pub struct EpisodeIndex {
     /// Index of the task in the suite.
     pub task: usize,

@@ -152,12 +152,15 @@ impl TargetVerdict {
 /// settled bounding box.
 ///
 /// [`super::judge`] defines each field.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Verdict {
     /// Goal Success: the goal held, its placements released and for long enough.
     pub goal: bool,
     /// Time at which the goal had held for long enough, s; null without success.
     pub goal_time_s: Option<f64>,
+    /// True if the goal was reached although the robot never touched a target.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub goal_untouched: bool,
     /// Goal Success by the looser predicate of SoftVTBench's released code.
     pub goal_v1: bool,
     /// The predicates of a goal of several parts.

@@ -17,6 +17,21 @@ use softvt_evaluation::{
 };
 use softvt_scene::{InitialStateOverride, SceneVariation};
 
+/// The built-in policies with access to ground-truth state. Whatever has one of these names is marked as they are.
+pub const PRIVILEGED_POLICIES: [&str; 11] = [
+    "expert",
+    "expert-binary",
+    "tactile-servo",
+    "fixed-closure",
+    "size-seen",
+    "contact-depth",
+    "one-force",
+    "one-force-for-all",
+    "drives",
+    "look-retry",
+    "weigh",
+];
+
 /// Id, task, target and policy of an episode: the first columns of its record.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 pub struct EpisodeHeader {
@@ -35,6 +50,9 @@ pub struct EpisodeHeader {
     /// True if the policy sees the true state, as experts do.
     #[serde(default)]
     pub privileged: bool,
+    /// True if the actions are those of a recorded run.
+    #[serde(default)]
+    pub replayed: bool,
     /// Asset of the target.
     pub asset: String,
     /// True if the target is a soft body.
@@ -46,6 +64,11 @@ pub struct EpisodeHeader {
 }
 
 impl EpisodeHeader {
+    /// True if the policy sees the true state, by its record or its name.
+    pub fn is_privileged(&self) -> bool {
+        self.privileged || PRIVILEGED_POLICIES.contains(&self.policy.as_str())
+    }
+
     /// Prompt of the task, which names it in results.
     pub fn task_prompt(&self) -> &str {
         self.task_prompt.as_ref().unwrap_or(&self.prompt)
@@ -70,6 +93,9 @@ impl Serialize for EpisodeHeader {
         map.serialize_entry("policy", &self.policy)?;
         if self.privileged {
             map.serialize_entry("privileged", &true)?;
+        }
+        if self.replayed {
+            map.serialize_entry("replayed", &true)?;
         }
         map.serialize_entry("asset", &self.asset)?;
         map.serialize_entry("soft", &self.soft)?;
@@ -170,6 +196,10 @@ pub struct RolloutStats {
     /// clamped.
     #[serde(default, skip_serializing_if = "is_zero")]
     pub clamped_steps: u32,
+    /// Number of attempts at the episode, of a policy outside of softvt that ended earlier ones or was interrupted;
+    /// absent for the usual one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub attempts: Option<u32>,
     /// Reason given by the controller for aborting the episode, if it did.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub gave_up: Option<String>,

@@ -1,11 +1,12 @@
 //! Reading of an episode record: a line that contradicts itself, or holds a key that no record has, is refused.
 
+use serde::{Serialize, de::DeserializeOwned};
 use serde_json::{Value, json};
 
-use super::record::EpisodeRecord;
+use super::record::{EpisodeRecord, RolloutStats};
 use softvt_evaluation::{
     safety::DeformationLimit,
-    verdict::{OtherObjectDeformation, Outcome, TargetVerdict},
+    verdict::{OtherObjectDeformation, Outcome, TargetVerdict, Verdict},
 };
 
 /// A text is not the record of an episode.
@@ -18,6 +19,19 @@ pub enum RecordError {
     UnknownKey(String),
     #[error("the record contradicts itself: {0}; it was changed after the episode, or damaged")]
     Contradiction(String),
+}
+
+/// True for a field of the header, the verdict or the counters of records.
+pub fn is_record_key(name: &str) -> bool {
+    /// True if a field of a `T` reads the key: none takes lists of empty lists.
+    fn is_read<T: Default + Serialize + DeserializeOwned>(name: &str) -> bool {
+        let mut part = json!(T::default());
+        part[name] = json!([[[]]]);
+        serde_json::from_value::<T>(part).is_err()
+    }
+    const HEADER: [&str; 8] =
+        ["suite", "task", "episode", "policy", "privileged", "replayed", "variation", "origin"];
+    HEADER.contains(&name) || is_read::<Verdict>(name) || is_read::<RolloutStats>(name)
 }
 
 /// Tolerance of sums and means, relative to 1.
@@ -116,6 +130,12 @@ impl EpisodeRecord {
         }
         if v.goal != v.goal_time_s.is_some() {
             return Err(format!("goal is {}, and goal_time_s is {}", v.goal, or_null(v.goal_time_s)));
+        }
+        if v.goal_untouched && !v.goal {
+            return Err("goal_untouched is true, and goal is false".to_owned());
+        }
+        if let Some(attempts) = self.stats.attempts.filter(|attempts| *attempts < 2) {
+            return Err(format!("attempts is {attempts}, and a record has those of several alone"));
         }
         if let Some(stage) = v.failed_stage.filter(|_| v.goal) {
             return Err(format!("goal is true, and failed_stage is {}", stage.name()));

@@ -235,8 +235,7 @@ fn joined(names: &BTreeSet<String>) -> String {
 
 /// Policies of the runs, with their privileged inputs.
 fn policies(runs: &[StoredRun]) -> String {
-    let label =
-        |run: &StoredRun| method_label(run.text("policy"), run.is_privileged(), run.observes_forces());
+    let label = |run: &StoredRun| method_label(run.text("policy"), run.marks());
     joined(&runs.iter().map(label).collect())
 }
 
@@ -290,8 +289,8 @@ fn difference_of_field(a: &StoredRun, b: &StoredRun, field: &str) -> Option<Stri
     (!names.is_empty()).then(|| format!("{field} ({})", names.join(", ")))
 }
 
-/// One sentence for each run that is judged by other limits than the first run of its suite.
-pub fn limit_warnings<'a>(runs: impl Iterator<Item = &'a StoredRun>) -> Vec<String> {
+/// One sentence for each run whose scripts or limits differ from those of the first run of its suite.
+pub fn difference_warnings<'a>(runs: impl Iterator<Item = &'a StoredRun>) -> Vec<String> {
     let mut firsts: Vec<&StoredRun> = Vec::new();
     let mut warnings = Vec::new();
     for run in runs {
@@ -299,9 +298,11 @@ pub fn limit_warnings<'a>(runs: impl Iterator<Item = &'a StoredRun>) -> Vec<Stri
             firsts.push(run);
             continue;
         };
-        if let Some(field) = difference_of_field(first, run, LIMITS) {
+        let fields = KEYED_FIELDS.iter().filter_map(|field| difference_of_field(first, run, field));
+        let fields = fields.collect::<Vec<_>>().join(" and ");
+        if !fields.is_empty() {
             warnings.push(format!(
-                "{} and {} have different {field}",
+                "{} and {} have different {fields}",
                 first.dir.display(),
                 run.dir.display()
             ));
@@ -312,7 +313,7 @@ pub fn limit_warnings<'a>(runs: impl Iterator<Item = &'a StoredRun>) -> Vec<Stri
 
 /// The path of a file in its project, whatever the folder from which a run named it: `../scripts/shifts.lua` is
 /// `scripts/shifts.lua`.
-fn in_project(path: &str) -> &str {
+pub fn in_project(path: &str) -> &str {
     let folders = ["scripts/", "suites/", "assets/"];
     let starts = folders.iter().filter_map(|folder| path.find(folder));
     let start = starts.filter(|at| *at == 0 || path[..*at].ends_with('/')).min();
@@ -665,8 +666,8 @@ mod tests {
         assert_eq!((in_project("x.lua"), in_project("my_suites/x.lua")), ("x.lua", "my_suites/x.lua"));
         part.manifest["thresholds"]["bun"] = json!(1.5);
         assert_eq!(differing(&part), ["sources (y.lua)", "thresholds (bun)"]);
-        let warnings = limit_warnings([&whole, &part, &whole].into_iter());
-        assert_eq!(warnings, ["a and b have different thresholds (bun)"]);
+        let warnings = difference_warnings([&whole, &part, &whole].into_iter());
+        assert_eq!(warnings, ["a and b have different sources (y.lua) and thresholds (bun)"]);
         let three = PolicyRanking::new(&[&whole, &whole, &part].map(|run| vec![run.clone()]))
             .expect("common episodes");
         assert_eq!(three.differing_fields, ["sources (y.lua)", "thresholds (bun)"]);

@@ -1,9 +1,13 @@
 //! One JSON row per run, for leaderboards.
 
-use serde::Serialize;
-use serde_json::Value;
+use std::collections::BTreeMap;
 
-use super::run_summary::RunSummary;
+use serde::Serialize;
+use serde_json::{Value, json};
+use sha2::{Digest, Sha256};
+
+use super::{comparison::in_project, run_summary::RunSummary, stored_run::StoredRun};
+use softvt_common::text::hex;
 use softvt_evaluation::statistics::Rate;
 use softvt_records::summary::SuiteSummary;
 
@@ -21,6 +25,8 @@ struct LeaderboardRow<'a> {
     method: &'a str,
     /// True if the policy had the true state.
     privileged: bool,
+    /// True if it repeated the actions of a recorded run.
+    replayed: bool,
     /// True if it had the true forces on the pads.
     force_observed: bool,
     /// Base seed; null in a judged run, whose `seed_hash` is given.
@@ -29,6 +35,14 @@ struct LeaderboardRow<'a> {
     split: &'a Value,
     shifts: &'a Value,
     settings_changed: &'a Value,
+    /// SHA-256 of the names and hashes of all files but that of the policy.
+    sources_sha256: String,
+    /// Those of softvt that the run has in another version.
+    modified: &'a Value,
+    /// Number of episodes of more than one attempt.
+    repeated_episodes: usize,
+    /// Number of episodes whose goal was reached without contact of the robot with a target.
+    goals_untouched: usize,
     /// True if the run is not finished.
     partial: bool,
     tasks: usize,
@@ -61,12 +75,17 @@ impl<'a> LeaderboardRow<'a> {
             policy: &summary.policy,
             method,
             privileged: summary.privileged,
+            replayed: summary.replayed,
             force_observed: summary.force_observed,
             seed: field("seed"),
             seed_hash: field("seed_hash"),
             split: field("split"),
             shifts: field("shifts"),
             settings_changed: field("set"),
+            sources_sha256: sources_sha256(run),
+            modified: field("modified"),
+            repeated_episodes: summary.repeated_episodes.len(),
+            goals_untouched: summary.goals_untouched.len(),
             partial: run.is_partial(),
             tasks: summary.by_task.len(),
             episodes: scores.episodes,
@@ -83,9 +102,16 @@ impl<'a> LeaderboardRow<'a> {
     }
 }
 
+fn sources_sha256(run: &StoredRun) -> String {
+    let sources = run.manifest["sources"].as_object().into_iter().flatten();
+    let sources = sources.filter(|(name, _)| name.as_str() != run.text("policy_file"));
+    let sources: BTreeMap<&str, &Value> = sources.map(|(name, hash)| (in_project(name), hash)).collect();
+    hex(&Sha256::digest(json!(sources).to_string()))
+}
+
 /// The rows of runs as JSON lines, in their order.
 pub fn rows(runs: &[RunSummary]) -> String {
-    let row = |run| serde_json::json!(LeaderboardRow::new(run)).to_string() + "\n";
+    let row = |run| json!(LeaderboardRow::new(run)).to_string() + "\n";
     runs.iter().map(row).collect()
 }
 

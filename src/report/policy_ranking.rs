@@ -14,7 +14,7 @@ use softvt_records::{
     paired_stats::{EpisodePair, PairedComparison, pair_episodes},
     paired_tests::{holm, letters},
     record::EpisodeRecord,
-    summary::GroupScores,
+    summary::{GroupScores, method_label},
 };
 
 /// Level at which two runs count as different, after Holm's adjustment for the number of pairs.
@@ -23,7 +23,7 @@ const LEVEL: f64 = 0.05;
 /// One of several runs of the same episodes.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct RankedRun {
-    /// Policy, or the folder if the policies have one name.
+    /// Policy, or the folder if the policies have one name, with its privileged inputs.
     pub name: String,
     /// Goal Success over the common episodes.
     pub goal: Rate,
@@ -74,8 +74,12 @@ impl PolicyRanking {
             let pairs = pair_episodes(common.iter().copied(), records(runs));
             pairs.into_iter().map(|pair| pair.second.clone()).collect()
         };
+        let marked = |(name, runs): (String, &Vec<StoredRun>)| {
+            let marks = runs.first().map(StoredRun::marks).unwrap_or_default();
+            (method_label(&name, marks), in_common(runs))
+        };
         let mut runs: Vec<(String, Vec<EpisodeRecord>)> =
-            names(folders).into_iter().zip(folders.iter().map(|runs| in_common(runs))).collect();
+            names(folders).into_iter().zip(folders).map(marked).collect();
         let scores =
             |records: &[EpisodeRecord]| GroupScores::from_records(&records.iter().collect::<Vec<_>>());
         runs.sort_by_key(|(_, records)| Reverse(scores(records).count(EpisodeCategory::Safe)));

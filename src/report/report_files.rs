@@ -8,8 +8,8 @@ use std::{
 use super::{
     leaderboard,
     page::{self, Thumbnails},
-    run_summary::RunSummary,
-    tables::{ResultTable, all_tables},
+    run_summary::{RunSummary, warnings},
+    tables::{ResultTable, all_tables, escape_markdown},
 };
 use softvt_common::files::{self, FileError};
 
@@ -48,7 +48,8 @@ pub fn write(runs: &[RunSummary], thumbnails: &Thumbnails, out: &Path) -> Result
         |format: fn(&ResultTable) -> String| tables.iter().map(format).collect::<Vec<_>>().join("\n");
     let texts = [
         page::page(runs, thumbnails, out),
-        joined(ResultTable::markdown),
+        warnings(runs).iter().map(|warning| escape_markdown(warning) + "\n\n").collect::<String>()
+            + &joined(ResultTable::markdown),
         LATEX_HEADER.to_owned() + &joined(ResultTable::latex),
         leaderboard::rows(runs),
     ];
@@ -65,6 +66,28 @@ mod tests {
         run_summary::{summarize_runs, tests::stored},
         sample_record,
     };
+
+    #[test]
+    fn runs_of_other_scripts_are_named_in_every_file() {
+        let run = |dir: &str, hash: &str| {
+            let mut run = stored(dir, "pi", vec![sample_record()]);
+            run.manifest["sources"] = serde_json::json!({ "../scripts/floor.lua": hash, "x.lua": "1" });
+            run
+        };
+        let root = tempfile::tempdir().unwrap();
+        let runs = summarize_runs(vec![run("a", "2"), run("b", "3"), run("c", "2")]);
+        write(&runs, &Thumbnails::new(), root.path()).unwrap();
+        let text = |name: &str| fs::read_to_string(root.path().join(name)).unwrap();
+        let warning = "a and b have different sources (scripts/floor.lua)";
+        for name in [PAGE, MARKDOWN] {
+            assert!(text(name).contains(warning) && !text(name).contains("a and c"), "{}", text(name));
+        }
+        let hashes: Vec<String> = text("report.jsonl")
+            .lines()
+            .map(|row| serde_json::from_str::<serde_json::Value>(row).unwrap()["sources_sha256"].to_string())
+            .collect();
+        assert!(hashes[0] != hashes[1] && hashes[0] == hashes[2], "{hashes:?}");
+    }
 
     #[test]
     fn the_page_of_a_new_folder_links_to_videos() {

@@ -63,6 +63,9 @@ fn contradiction(run: &StatedRun, record: &EpisodeRecord) -> Option<String> {
     {
         return Some(format!("privileged is {}, and that of the run {privileged}", record.header.privileged));
     }
+    if record.header.replayed && !manifest["replayed"].is_object() {
+        return Some("replayed is true, and the run names no recorded run".to_owned());
+    }
     let expected_s = f64::from(s.steps) * CONTROL_DT;
     if is_valid && (s.time_s - expected_s).abs() > ROUNDING {
         return Some(format!("time_s is {}, and {} steps take {expected_s} s", s.time_s, s.steps));
@@ -185,6 +188,7 @@ mod tests {
         assert!(of(&|r| r.verdict.slip_mm = 5.0).contains("no_slip is true, and slip_mm 5"));
         assert!(of(&|r| r.verdict.slip_ok = Some(true)).contains("slip_ok is not null"));
         assert!(of(&|r| r.stats.steps += 5).contains("steps take"));
+        assert!(of(&|r| r.header.replayed = true).starts_with("replayed is true"));
         assert!(of(&|r| r.header.privileged = !r.header.privileged).starts_with("privileged is"));
         let of_gentle = of(&|r| (r.verdict.gentle, r.verdict.grip_ratio) = (true, Some(9.0)));
         assert!(of_gentle.contains("gentle is true"), "{of_gentle}");

@@ -22,6 +22,8 @@ pub const EPISODES: &str = "episodes.jsonl";
 pub const RUN: &str = "run.json";
 /// The scripts and calibrations that the run was made from.
 pub const SCRIPTS: &str = "scripts.zip";
+/// One line per attempt at an episode of an unfinished run, if its policy is outside of softvt.
+pub const ATTEMPTS: &str = "attempts.jsonl";
 /// Results of a finished run.
 pub const SUMMARY: &str = "summary.json";
 

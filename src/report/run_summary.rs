@@ -2,12 +2,12 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use super::stored_run::StoredRun;
+use super::{comparison::difference_warnings, stored_run::StoredRun};
 use softvt_common::text::decimal;
 use softvt_evaluation::{drop::DropReason, verdict::Outcome};
 use softvt_records::{
     record::{EpisodeRecord, SoftTarget},
-    summary::SuiteSummary,
+    summary::{MethodMarks, SuiteSummary},
 };
 
 /// A run with its results.
@@ -59,11 +59,11 @@ pub fn summarize_runs(mut runs: Vec<StoredRun>) -> Vec<RunSummary> {
 
 fn summarize(run: StoredRun) -> RunSummary {
     let mut summary = SuiteSummary::from_records(run.suite(), run.text("policy"), &run.records);
-    summary.force_observed |= run.observes_forces();
-    if run.records.is_empty() {
-        // An unfinished run has no episode yet that says so.
-        summary.privileged |= run.manifest["privileged"] == true;
-    }
+    // An unfinished run has no episode yet that says so.
+    let MethodMarks { privileged, replayed, force_observed } = run.marks();
+    summary.privileged |= privileged;
+    summary.replayed |= replayed;
+    summary.force_observed |= force_observed;
     let mut method = summary.method_label();
     // Changes to the suite, such as `mass=2`.
     let changes = run.changes().assignments();
@@ -71,6 +71,16 @@ fn summarize(run: StoredRun) -> RunSummary {
         method += &format!(" · {}", changes.join(", "));
     }
     RunSummary { run, summary, method }
+}
+
+/// What a reader of the results of these runs has to know, one sentence each.
+pub fn warnings(runs: &[RunSummary]) -> Vec<String> {
+    let of_run = |run: &RunSummary| {
+        let dir = run.run.dir.display();
+        let notes = run.summary.attempt_notes().into_iter().map(|note| format!("{dir}: {note}"));
+        run.run.warnings().into_iter().chain(notes).collect::<Vec<_>>()
+    };
+    runs.iter().flat_map(of_run).chain(difference_warnings(runs.iter().map(|run| &run.run))).collect()
 }
 
 impl RunSummary {
@@ -222,6 +232,23 @@ pub(super) mod tests {
             names(&[&plain, &again]),
             ["expert (privileged) · runs/a", "expert (privileged) · runs/d"]
         );
+    }
+
+    #[test]
+    fn recorded_actions_and_names_of_privileged_policies_are_marked_whatever_the_record_says() {
+        let mut replayed = stored("a", "pi05", vec![sample_record()]);
+        replayed.manifest["replayed"] = json!({ "policy": "x", "privileged": false });
+        let mut named = stored("b", "expert-binary", vec![sample_record()]);
+        named.manifest["privileged"] = json!(false);
+        let runs = summarize_runs(vec![replayed, named]);
+        let methods: Vec<&str> = runs.iter().map(|run| run.method.as_str()).collect();
+        assert_eq!(methods, ["pi05 (replayed)", "expert-binary (privileged)"]);
+        let rows = crate::leaderboard::rows(&runs);
+        let marks = |row: &str| {
+            let row: serde_json::Value = serde_json::from_str(row).unwrap();
+            [&row["privileged"], &row["replayed"]].map(|mark| mark.as_bool().unwrap())
+        };
+        assert_eq!(rows.lines().map(marks).collect::<Vec<_>>(), [[false, true], [true, false]]);
     }
 
     #[test]

@@ -16,7 +16,10 @@ use super::{
 use softvt_benchmark::run_changes::RunChanges;
 use softvt_common::episode_id::EpisodeIndex;
 use softvt_common::files::{self, FileError};
-use softvt_records::record::EpisodeRecord;
+use softvt_records::{
+    record::{EpisodeRecord, PRIVILEGED_POLICIES},
+    summary::MethodMarks,
+};
 
 const VERSION: &str = env!("CARGO_PKG_VERSION");
 
@@ -123,9 +126,18 @@ impl StoredRun {
         self.manifest["twin_of"].is_string() || self.changes().is_rigid_twin()
     }
 
-    /// True if the policy has access to ground-truth state.
+    /// True if the policy has access to ground-truth state, by `run.json` or by its name.
     pub fn is_privileged(&self) -> bool {
-        self.manifest["privileged"].as_bool() == Some(true)
+        self.manifest["privileged"] == true || PRIVILEGED_POLICIES.contains(&self.text("policy"))
+    }
+
+    /// What the policy knew beyond what a robot measures, and whose actions it repeated.
+    pub fn marks(&self) -> MethodMarks {
+        MethodMarks {
+            privileged: self.is_privileged(),
+            replayed: self.manifest["replayed"].is_object(),
+            force_observed: self.observes_forces(),
+        }
     }
 
     /// True if the policy keeps one number constant, by what shows of an object. Runs of earlier versions do not say so.
@@ -223,6 +235,11 @@ impl StoredRun {
                 self.text("softvt")
             ));
         }
+        let modified = self.manifest["modified"].as_array().into_iter().flatten();
+        let modified: Vec<&str> = modified.filter_map(Value::as_str).collect();
+        if !modified.is_empty() {
+            warnings.push(format!("{dir} has other files than softvt: {}", modified.join(", ")));
+        }
         warnings
     }
 }
@@ -287,6 +304,17 @@ fn load_one(dir: &Path) -> Result<StoredRun, StoredRunError> {
         if !is_shard(&manifest["shard"]) {
             let what = format!("its shard is {}; expected I/N with 1 <= I <= N", manifest["shard"]);
             return Err(invalid(what));
+        }
+        let replayed = &manifest["replayed"];
+        let is_privileged = |policy: &Value| {
+            policy["privileged"] == true
+                || policy["policy"].as_str().is_some_and(|name| PRIVILEGED_POLICIES.contains(&name))
+        };
+        if is_privileged(replayed) && manifest["privileged"] == false {
+            return Err(invalid(format!(
+                "privileged is false, and it replays {}, which is privileged",
+                replayed["policy"]
+            )));
         }
         let mut records = read_episodes(dir)?;
         check_unique(dir, &records)?;
@@ -353,6 +381,26 @@ mod tests {
             assert!(error.contains(&expected), "{error}");
         }
         assert!(load_shard(1.into()).is_err());
+    }
+
+    #[test]
+    fn a_replay_of_a_privileged_run_that_is_not_privileged_is_refused() {
+        let root = tempfile::tempdir().unwrap();
+        let load_replay = |replayed: Value| {
+            let manifest = serde_json::json!({
+                "softvt": VERSION, "script": "x.lua", "suite": "suite", "policy": "pi05", "tasks": [0], "episodes": 1,
+                "arguments": [], "shifts": [], "set": [], "seed": 11, "privileged": false, "replayed": replayed,
+            });
+            files::write_json(&root.path().join(RUN), &manifest).unwrap();
+            files::write_json_lines(&root.path().join(EPISODES), &[] as &[EpisodeRecord]).unwrap();
+            load(root.path()).map_or_else(|error| error.to_string(), |_| String::new())
+        };
+        assert_eq!(load_replay(serde_json::json!({ "policy": "mine", "privileged": false })), "");
+        for (policy, privileged) in [("expert-binary", false), ("mine", true)] {
+            let message = load_replay(serde_json::json!({ "policy": policy, "privileged": privileged }));
+            let expected = format!("privileged is false, and it replays {policy:?}, which is privileged");
+            assert!(message.ends_with(&expected), "{message}");
+        }
     }
 
     #[test]

@@ -244,9 +244,13 @@ fn push_notes(text: &mut StyledText, summary: &SuiteSummary, format: TerminalFor
     if summary.privileged {
         note("privileged: it reads the true state, which no robot has");
     }
+    if summary.replayed {
+        note("replayed: the actions are those of a recorded run");
+    }
     if summary.force_observed {
         note("force_observed: it reads the true forces at the pads, which no real sensor measures");
     }
+    summary.attempt_notes().iter().for_each(|line| note(line));
     command_notes(&summary.commands).iter().for_each(|line| note(line));
     for (name, _) in scores.metrics.iter().filter(|(_, values)| values.n == 0) {
         note(&format!("metric {name} has no value in any valid episode: its function returned nil"));
@@ -359,7 +363,10 @@ mod tests {
         let text = table(&summary, TerminalFormat::PLAIN);
         assert!(text.lines().all(|line| line.chars().count() < 80), "{text}");
         let lines: Vec<&str> = text.lines().collect();
-        assert_eq!(lines[..2], ["suite · expert · 3 episodes", "● 1 safe  ✗ 1 over the limit  ▨ 1 invalid"]);
+        assert_eq!(
+            lines[..2],
+            ["suite · expert (privileged) · 3 episodes", "● 1 safe  ✗ 1 over the limit  ▨ 1 invalid"]
+        );
         assert_eq!(words(&text, "Safety")[..6], ["Safety", "33", "%", "[", "6,", "79]"]);
         assert!(text.contains("gap 33 points: placed over the limit\n"), "1.25 % collapsed: {text}");
         assert_eq!(

@@ -18,7 +18,7 @@ use crate::{
 };
 use softvt_benchmark::{Condition, ObjectType, Plan, REFERENCE, ShiftValue, Suite, Task, settings::Settings};
 use softvt_common::{files::replace, text};
-use softvt_records::summary::method_label;
+use softvt_records::summary::{MethodMarks, method_label};
 use softvt_report::{
     condition_table::{ConditionOutcome, ConditionRow, ConditionTable},
     run_folder::RunFolder,
@@ -278,7 +278,8 @@ fn compare_conditions(
     cases: &[ConditionCase],
     runs: Vec<Option<PreparedRun>>,
 ) -> Result<ConditionTable, RunError> {
-    let (mut reference, mut force_observed) = (None, false);
+    let mut marks = MethodMarks { privileged: config.policy.privileged, ..MethodMarks::default() };
+    let mut reference = None;
     let mut rows = Vec::new();
     for (case, run) in cases.iter().zip(runs) {
         let mut outcome = None;
@@ -288,7 +289,8 @@ fn compare_conditions(
             let result = run_suite(&run, &mut |_| ())?;
             outcome = Some(ConditionOutcome::new(case.folder.clone(), &result.records, reference.as_deref()));
             reference.get_or_insert(result.records);
-            force_observed |= result.summary.force_observed;
+            marks.force_observed |= result.summary.force_observed;
+            marks.replayed |= result.summary.replayed;
         }
         rows.push(ConditionRow {
             condition: case.condition.name.clone(),
@@ -302,7 +304,7 @@ fn compare_conditions(
         });
     }
     let deformable = suite.object_type == ObjectType::Deformable && !config.rigid_twin;
-    let policy = method_label(&config.policy.name, config.policy.privileged, force_observed);
+    let policy = method_label(&config.policy.name, marks);
     Ok(ConditionTable { suite: config.suite_name(suite), policy, deformable, rows })
 }
 

@@ -3,11 +3,13 @@
 use std::{
     collections::BTreeSet,
     path::{Path, PathBuf},
+    sync::Arc,
 };
 
 use serde::Serialize;
 
 use crate::{
+    attempts::Attempts,
     config::RunConfig,
     episode_list::{EpisodeJob, EpisodeList},
     error::{RunError, RunErrorCause},
@@ -21,6 +23,7 @@ use softvt_common::cancel;
 use softvt_common::episode_id::EpisodeIndex;
 use softvt_common::{files, parallel, text::counted};
 use softvt_evaluation::{category::EpisodeCategory, verdict::Outcome};
+use softvt_policy::PolicyError;
 use softvt_records::{record::EpisodeRecord, summary::SuiteSummary};
 use softvt_report::{
     actions,
@@ -28,7 +31,7 @@ use softvt_report::{
     run_folder::{EPISODES, RUN, RunFolder, SUMMARY},
     softvtbench_files,
 };
-use softvt_rollout::FinishedEpisode;
+use softvt_rollout::{Episode, FinishedEpisode};
 
 /// The episodes of a finished run, in order, with their summary.
 #[derive(Clone, Debug)]
@@ -67,6 +70,8 @@ pub(crate) struct RunLog<'a> {
     run: &'a PreparedRun<'a>,
     folder: RunFolder,
     pub records: Vec<EpisodeRecord>,
+    /// Those of a policy outside of softvt.
+    pub attempts: Option<Arc<Attempts>>,
 }
 
 impl<'a> RunLog<'a> {
@@ -80,7 +85,11 @@ impl<'a> RunLog<'a> {
         records: Vec<EpisodeRecord>,
         manifest: &impl Serialize,
     ) -> Result<Self, RunError> {
-        let log = Self { run, folder, records };
+        let attempts = match run.config.policy.is_outside() {
+            true => Some(Arc::new(Attempts::open(folder.path())?)),
+            false => None,
+        };
+        let log = Self { run, folder, records, attempts };
         log.check_records()?;
         run_manifest::write_or_compare(log.folder.path(), manifest)?;
         StoredScripts::new(run.loaded, run.calibration_files.texts()).write(log.folder.path())?;
@@ -162,9 +171,11 @@ impl<'a> RunLog<'a> {
     /// A file cannot be written.
     pub(crate) fn add(
         &mut self,
-        finished: FinishedEpisode,
+        mut finished: FinishedEpisode,
         write: impl Fn(&FinishedEpisode) -> Result<(), RunError>,
     ) -> Result<&EpisodeRecord, RunError> {
+        let index = finished.record.header.id.index();
+        finished.record.stats.attempts = self.attempts.as_ref().and_then(|attempts| attempts.several(index));
         write(&finished)?;
         self.folder.append(&finished.record)?;
         self.records.push(finished.record);
@@ -178,6 +189,11 @@ impl<'a> RunLog<'a> {
     pub(crate) fn sort(&mut self) -> Result<(), RunError> {
         self.records.sort_by_key(|record| record.header.id.index());
         Ok(self.folder.write_in_order(&self.records)?)
+    }
+
+    /// True if there is neither a record nor an attempt.
+    pub(crate) fn is_empty(&self) -> bool {
+        self.records.is_empty() && self.attempts.as_ref().is_none_or(|attempts| attempts.is_empty())
     }
 
     /// Removes the folder. The same command must work once an error is fixed, if there is nothing to keep.
@@ -204,7 +220,8 @@ impl<'a> RunLog<'a> {
     /// # Errors
     /// The file cannot be written.
     pub(crate) fn write_summary(&self) -> Result<(), RunError> {
-        Ok(files::write_json(&self.run.out.join(SUMMARY), &self.summary())?)
+        files::write_json(&self.run.out.join(SUMMARY), &self.summary())?;
+        self.attempts.as_ref().map_or(Ok(()), |attempts| attempts.remove())
     }
 
     /// Summary of the episodes so far.
@@ -268,8 +285,18 @@ pub(crate) fn run_suite(
             records: log.records,
         });
     }
+    let attempts = log.attempts.clone();
     let simulate = |job: EpisodeJob| {
-        let mut finished = run.run_episode(job, artifacts.may_render(job.episode), &run.controllers)?;
+        let mut calls = 0;
+        // The second call is that after the first action.
+        let mut begin = |_: &mut Episode| {
+            calls += 1;
+            let begun = attempts.as_ref().filter(|_| calls == 2).map(|attempts| attempts.begin(job.index()));
+            begun.unwrap_or(Ok(())).map_err(|error| PolicyError::Script(error.to_string()))
+        };
+        let (origin, keep_states) = (run.origins.get(&job.index()), artifacts.may_render(job.episode));
+        let simulated = run.simulate(job, origin, keep_states, &run.controllers, &mut begin)?;
+        let mut finished = simulated.map_err(|error| run.episode_error(&error))?;
         let rendered = artifacts.render(&mut finished);
         Ok(SimulatedEpisode { finished, rendered })
     };
@@ -288,7 +315,7 @@ pub(crate) fn run_suite(
         )
     });
     match outcome {
-        Err(error) if error.cause != RunErrorCause::Interrupt && log.records.is_empty() => {
+        Err(error) if error.cause != RunErrorCause::Interrupt && log.is_empty() => {
             log.discard()?;
             return Err(error);
         }
@@ -466,7 +493,7 @@ mod tests {
     use crate::{config::ConfiguredScript, suite_run::SuiteRun};
     use softvt_benchmark::Plan;
     use softvt_benchmark::Task;
-    use softvt_policy::{Action, ActionChunk, EpisodeBrief, Observation, Policy, PolicyError, SensorStreams};
+    use softvt_policy::{Action, ActionChunk, EpisodeBrief, Observation, Policy, SensorStreams};
     use softvt_rollout::{ChunkedPolicy, Controller};
     use softvt_script::EpisodeSetup;
 

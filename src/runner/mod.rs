@@ -6,6 +6,7 @@
 //! here prints: progress and messages go to an [`Observer`].
 #![warn(missing_docs, unreachable_pub)]
 
+mod attempts;
 pub mod catalog;
 mod check;
 pub mod conditions;

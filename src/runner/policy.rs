@@ -511,6 +511,12 @@ impl PolicyConfig {
         }
     }
 
+    /// True for a policy whose answers need not be the same in another attempt at an episode: one in another program,
+    /// or in Rust.
+    pub(crate) fn is_outside(&self) -> bool {
+        matches!(self.kind, PolicyKind::Server(_) | PolicyKind::Client(_) | PolicyKind::Rust(_))
+    }
+
     /// True for the clients of `softvt serve`.
     pub(crate) fn is_client(&self) -> bool {
         matches!(self.kind, PolicyKind::Client(_))
@@ -651,16 +657,17 @@ fn refuse_options_without_effect(args: &PolicyOptions) -> Result<(), RunError> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use softvt_records::record::PRIVILEGED_POLICIES;
 
     #[test]
-    fn built_in_policies_have_names() {
+    fn built_in_policies_have_names_and_those_of_privileged_ones_are_listed() {
         for policy in BuiltinPolicy::ALL {
             let name = policy.name();
             assert_eq!(name.parse(), Ok(PolicySource::Builtin(policy)));
             assert_eq!(PolicySource::Builtin(policy).word(), name);
             let loaded = PolicyConfig::load(&PolicyOptions::new(PolicySource::Builtin(policy))).unwrap();
             assert_eq!(loaded.name, name);
-            assert_eq!(loaded.privileged, !["noop", "random"].contains(&name));
+            assert_eq!(loaded.privileged, PRIVILEGED_POLICIES.contains(&name), "{name}");
             assert!(!policy.about().is_empty());
         }
     }

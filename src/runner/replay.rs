@@ -52,6 +52,8 @@ pub(crate) fn replay_factory(recorded: Vec<Action>, record: &EpisodeRecord) -> C
 pub(crate) fn with_policy_fields(mut simulated: EpisodeRecord, record: &EpisodeRecord) -> EpisodeRecord {
     simulated.header.policy.clone_from(&record.header.policy);
     simulated.header.privileged = record.header.privileged;
+    simulated.header.replayed = record.header.replayed;
+    simulated.stats.attempts = record.stats.attempts;
     simulated.stats.force_observed = record.stats.force_observed;
     simulated.stats.camera_inside = record.stats.camera_inside;
     simulated.stats.gave_up.clone_from(&record.stats.gave_up);

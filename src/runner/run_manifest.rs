@@ -19,7 +19,7 @@ use softvt_common::files;
 use softvt_dataset::card::ImportedFile;
 use softvt_evaluation::deformation::METRIC_ID;
 use softvt_policy::profile::{GripCode, Profile};
-use softvt_report::{run_folder::RUN, stored_run};
+use softvt_report::{comparison::in_project, run_folder::RUN, stored_run};
 
 /// Content of `run.json`.
 #[derive(Serialize)]
@@ -95,6 +95,9 @@ pub(crate) struct RunManifest<'a> {
     settings: &'a Settings,
     /// SHA-256 of files by name.
     sources: BTreeMap<String, String>,
+    /// Those of them that are not as in the library of the binary, by their path there.
+    #[serde(skip_serializing_if = "BTreeSet::is_empty")]
+    modified: BTreeSet<&'a str>,
     /// Definition of D and of its limits.
     metric_id: &'static str,
     /// τ by asset, %.
@@ -143,11 +146,25 @@ impl<'a> RunManifest<'a> {
             set,
             settings: &run.settings,
             sources: run.sources.clone(),
+            modified: modified(&run.sources),
             metric_id: METRIC_ID,
             thresholds: run.calibrations.tau_pct.clone(),
             force_observed: run.force_observed,
         }
     }
+}
+
+/// The files that the library of the binary has in another version, by their path there.
+fn modified(sources: &BTreeMap<String, String>) -> BTreeSet<&str> {
+    let is_other = |(name, hash): &(&str, &String)| {
+        softvt_script::embedded(name).is_some_and(|own| softvt_script::sha256(own) != **hash)
+    };
+    sources
+        .iter()
+        .map(|(name, hash)| (in_project(name), hash))
+        .filter(is_other)
+        .map(|(name, _)| name)
+        .collect()
 }
 
 /// A manifest and the folder in which its command ran.
@@ -205,10 +222,8 @@ pub(crate) fn is_in(dir: &Path, manifest: &RunManifest) -> Result<bool, RunError
 /// A manifest without the fields that earlier versions did not write, if the stored one lacks them.
 fn comparable(manifest: &impl Serialize, stored: &Value) -> Value {
     let mut manifest = json!(manifest);
-    if stored["blind"].is_null()
-        && let Some(fields) = manifest.as_object_mut()
-    {
-        fields.shift_remove("blind");
+    if let Some(fields) = manifest.as_object_mut() {
+        fields.retain(|name, _| !["blind", "modified"].contains(&name.as_str()) || !stored[name].is_null());
     }
     manifest
 }
@@ -262,6 +277,21 @@ mod tests {
     use super::*;
 
     #[test]
+    fn files_that_differ_from_those_of_the_binary_are_named() {
+        let own = |path: &str| softvt_script::sha256(softvt_script::embedded(path).unwrap());
+        let other = "0".repeat(64);
+        let sources = [
+            ("/home/me/softvt/scripts/shifts.lua", own("scripts/shifts.lua")),
+            ("../scripts/layouts/floor.lua", other.clone()),
+            ("assets/calibration/cube.json", other.clone()),
+            ("mine.lua", other),
+        ];
+        let sources = sources.map(|(name, hash)| (name.to_owned(), hash)).into();
+        let named: Vec<&str> = modified(&sources).into_iter().collect();
+        assert_eq!(named, ["assets/calibration/cube.json", "scripts/layouts/floor.lua"]);
+    }
+
+    #[test]
     fn the_first_difference_is_named_by_its_path() {
         let a = json!({ "seed": 0, "settings": { "physics": { "dt": 0.0166 } }, "shifts": [] });
         assert_eq!(difference(&a, &a.clone()), None);
@@ -275,7 +305,7 @@ mod tests {
 
     #[test]
     fn a_run_of_an_earlier_version_may_lack_what_it_did_not_write() {
-        let now = json!({ "policy": "drives", "blind": true, "seed": 0 });
+        let now = json!({ "policy": "drives", "blind": true, "seed": 0, "modified": ["scripts/shifts.lua"] });
         assert_eq!(
             comparable(&now, &json!({ "policy": "drives", "seed": 0 })),
             json!({ "policy": "drives", "seed": 0 })

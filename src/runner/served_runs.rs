@@ -63,6 +63,7 @@ impl<'a> ServedRuns<'a> {
     pub fn recorder(&self) -> EpisodeRecorder<'_> {
         EpisodeRecorder {
             selects: Box::new(|id| self.find(&id.suite).is_some_and(|run| run.selects(id))),
+            begin: Box::new(|id| self.begin(id)),
             record: Box::new(|finished| self.record(finished)),
             report_lost: Box::new(|id, reason| {
                 // An interrupt ends all episodes.
@@ -80,21 +81,32 @@ impl<'a> ServedRuns<'a> {
         self.runs.iter().find(|served| served.run.name == suite)
     }
 
+    /// Writes that an attempt at an episode has begun. After an error the server ends.
+    fn begin(&self, id: &EpisodeId) -> Result<(), RequestError> {
+        let attempts = self.find(&id.suite).and_then(|served| lock(&served.log).attempts.clone());
+        let begun = attempts.map_or(Ok(()), |attempts| attempts.begin(id.index()));
+        begun.map_err(|error| self.fail(error))
+    }
+
+    /// Ends the server after an error.
+    fn fail(&self, error: RunError) -> RequestError {
+        let message = error.to_string();
+        lock(&self.failure).get_or_insert(error);
+        self.cancel.request();
+        RequestError::Record(message)
+    }
+
     /// Writes the files of an episode. After an error the server ends.
     fn record(&self, finished: FinishedEpisode) -> Result<(), RequestError> {
         let suite = &finished.record.header.id.suite;
         let served =
             self.find(suite).ok_or_else(|| RequestError::Record(format!("unknown suite {suite}")))?;
-        served.add(finished).map_err(|error| {
-            let message = error.to_string();
-            lock(&self.failure).get_or_insert(error);
-            self.cancel.request();
-            RequestError::Record(message)
-        })
+        served.add(finished).map_err(|error| self.fail(error))
     }
 
-    /// Sorts the episodes of the folders. A folder without an episode is removed, so that the same command works again.
-    /// Returns the results of the others, and why the server ended: a file that could not be written, or an interrupt.
+    /// Sorts the episodes of the folders. A folder without an episode or attempt is removed, so that the same command
+    /// works again. Returns the results of the others, and why the server ended: a file that could not be written, or
+    /// an interrupt.
     pub fn finish(self) -> (Vec<SuiteSummary>, Result<(), RunError>) {
         let (config, failure) = (self.config, lock(&self.failure).take());
         let (mut recorded, mut requested, mut summaries) = (0, 0, Vec::new());
@@ -103,13 +115,10 @@ impl<'a> ServedRuns<'a> {
             let (run, mut log) = (served.run, served.log.into_inner().unwrap_or_else(|log| log.into_inner()));
             recorded += log.records.len();
             requested += run.jobs.len();
-            outcome = outcome.and(if log.records.is_empty() {
-                log.discard()
-            } else {
-                let sorted = log.sort();
+            if !log.records.is_empty() {
                 summaries.push(log.summary());
-                sorted
-            });
+            }
+            outcome = outcome.and(if log.is_empty() { log.discard() } else { log.sort() });
         }
         if recorded == 0 {
             return (summaries, with_kept(outcome, "no episode was recorded", None));
@@ -119,11 +128,11 @@ impl<'a> ServedRuns<'a> {
         (summaries, with_kept(outcome, &kept, (recorded < requested).then_some(out)))
     }
 
-    /// Removes the folders without episodes.
+    /// Removes the folders without episodes and attempts.
     fn discard_empty(self) -> Result<(), RunError> {
         for served in self.runs {
             let log = served.log.into_inner().unwrap_or_else(|log| log.into_inner());
-            if log.records.is_empty() {
+            if log.is_empty() {
                 log.discard()?;
             }
         }

@@ -14,7 +14,7 @@ use crate::{
     error::{RunError, RunErrorCause},
     friction::friction_warnings,
     limits::{CalibrationFiles, Calibrations, LimitScan, SceneLimits},
-    policy::{ControllerFactory, DeclaredStreams},
+    policy::{ControllerFactory, DeclaredStreams, PolicyConfig},
     recorded_runs::{RecordedRuns, ReplaySource},
     selection::{select_episodes, select_tasks},
 };
@@ -24,7 +24,7 @@ use softvt_common::episode_id::{EpisodeId, EpisodeIndex, EpisodeSplit};
 use softvt_common::{parallel, text::unknown_name};
 use softvt_dataset::card::ImportedFile;
 use softvt_policy::{EpisodeBrief, PolicyError, SensorStreams, remote::PolicyConnections};
-use softvt_records::record::DemonstrationOrigin;
+use softvt_records::record::{DemonstrationOrigin, PRIVILEGED_POLICIES};
 use softvt_rollout::{
     AssetCache, Episode, EpisodeError, EpisodeSpec, FinishedEpisode, SceneBuildError, SensorAssets, Sensors,
     Simulation, StatePredicate, check_goal, check_sensors, cost_warning,
@@ -221,9 +221,13 @@ impl<'a> SuiteRun<'a> {
         }
     }
 
-    /// True if the policy has access to ground-truth state, or had it when its actions were recorded.
+    /// True if the policy has access to ground-truth state, or had it when its actions were recorded; also for the name
+    /// of a policy that has.
     pub(crate) fn is_privileged(&self) -> bool {
-        self.config.policy.privileged || self.replay_source.as_ref().is_some_and(|source| source.privileged)
+        let PolicyConfig { privileged, name, .. } = &self.config.policy;
+        *privileged
+            || PRIVILEGED_POLICIES.contains(&name.as_str())
+            || self.replay_source.as_ref().is_some_and(|source| source.privileged)
     }
 
     /// Id of an episode of the run. The suite has its name in the script, which may differ from that in results.
@@ -337,8 +341,11 @@ impl<'a> SuiteRun<'a> {
         self.simulate(job, origin, keep_states, controllers, &mut |_| Ok(()))
     }
 
-    /// Runs one episode, and calls `watch` as [`Episode::run_watched`] does.
-    fn simulate(
+    /// As [`Self::run_episode_from`], and calls `watch` as [`Episode::run_watched`] does.
+    ///
+    /// # Errors
+    /// As [`Self::run_episode_from`], and those of `watch`.
+    pub(crate) fn simulate(
         &self,
         job: EpisodeJob<'_>,
         origin: Option<&DemonstrationOrigin>,
@@ -399,6 +406,7 @@ impl<'a> SuiteRun<'a> {
         spec.metrics.clone_from(&opened.metrics);
         spec.header.task_prompt = task_prompt;
         spec.header.privileged = self.is_privileged();
+        spec.header.replayed = self.replay_source.is_some();
         spec.header.variation = opened.variation.clone().map(Box::new);
         spec.header.origin = origin.cloned().map(Box::new);
         let record_trace = self.records_trace;

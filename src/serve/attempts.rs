@@ -5,7 +5,7 @@
 //! its end. Until then no other client can step the episode, so that none tries out actions for it.
 
 use std::{
-    collections::BTreeMap,
+    collections::{BTreeMap, btree_map::Entry},
     fmt,
     sync::{Mutex, MutexGuard},
 };
@@ -45,14 +45,23 @@ impl<'a> Attempts<'a> {
 
     /// The attempt at an episode whose first action was executed after a reset. `None` if an earlier one exists, or the
     /// episode is not one that the server records.
-    pub(super) fn begin(&'a self, id: &EpisodeId) -> Option<Attempt<'a>> {
-        let recorder = self.recorder.filter(|recorder| (recorder.selects)(id))?;
-        let mut states = lock(&self.states);
-        if states.contains_key(id) {
-            return None;
-        }
-        states.insert(id.clone(), AttemptState::InProgress);
-        Some(Attempt { id: id.clone(), recorder, attempts: self })
+    ///
+    /// # Errors
+    /// The recorder fails.
+    pub(super) fn begin(&'a self, id: &EpisodeId) -> Result<Option<Attempt<'a>>, RequestError> {
+        let Some(recorder) = self.recorder.filter(|recorder| (recorder.selects)(id)) else { return Ok(None) };
+        match lock(&self.states).entry(id.clone()) {
+            Entry::Occupied(_) => return Ok(None),
+            Entry::Vacant(free) => free.insert(AttemptState::InProgress),
+        };
+        (recorder.begin)(id)?;
+        Ok(Some(Attempt { id: id.clone(), recorder, attempts: self }))
+    }
+
+    /// True if an attempt at the episode can still be recorded.
+    pub(super) fn is_open(&self, id: &EpisodeId) -> bool {
+        self.recorder.is_some_and(|recorder| (recorder.selects)(id))
+            && lock(&self.states).get(id) != Some(&AttemptState::Over)
     }
 
     /// Checks that no client but that of the attempt `own` has begun an attempt at the episode that is not over.
@@ -87,10 +96,11 @@ impl<'a> Attempts<'a> {
         }
     }
 
-    /// Ends the client's `own` attempt at an episode, or rules out a later one of any client.
+    /// Ends the client's `own` attempt at an episode, or rules out a later one of any client, which counts as an
+    /// attempt.
     ///
     /// # Errors
-    /// As [`Self::check_free`].
+    /// As [`Self::check_free`], or the recorder fails.
     pub(super) fn exclude(
         &self,
         request: &str,
@@ -103,7 +113,7 @@ impl<'a> Attempts<'a> {
         if before != Some(AttemptState::Over) {
             (recorder.report_lost)(id, reason);
         }
-        Ok(())
+        if before.is_none() { (recorder.begin)(id) } else { Ok(()) }
     }
 
     /// Ends the attempt at an episode, and returns its state before.
@@ -149,11 +159,16 @@ mod tests {
         EpisodeId { suite: "one".to_owned(), task: 0, episode, base_seed: 0, split: EpisodeSplit::Validation }
     }
 
-    /// Runs `test` on the attempts of a server that records the episodes below 10; returns the reports of lost ones.
-    fn reports(test: impl Fn(&Attempts)) -> Vec<String> {
-        let lost = Mutex::new(Vec::new());
+    /// Runs `test` on the attempts of a server that records the episodes below 10; returns the reports of lost ones,
+    /// and the episodes whose attempts were written.
+    fn reports(test: impl Fn(&Attempts)) -> (Vec<String>, Vec<u32>) {
+        let (lost, begun) = (Mutex::new(Vec::new()), Mutex::new(Vec::new()));
         let recorder = EpisodeRecorder {
             selects: Box::new(|id| id.episode < 10),
+            begin: Box::new(|id| {
+                begun.lock().unwrap().push(id.episode);
+                Ok(())
+            }),
             record: Box::new(|_| Ok(())),
             report_lost: Box::new(|id, reason| {
                 lost.lock().unwrap().push(format!("{}: {reason}", id.episode));
@@ -161,31 +176,32 @@ mod tests {
         };
         test(&Attempts::new(Some(&recorder)));
         drop(recorder);
-        lost.into_inner().unwrap()
+        (lost.into_inner().unwrap(), begun.into_inner().unwrap())
     }
 
     #[test]
     fn only_the_first_attempt_at_an_episode_counts() {
-        let lost = reports(|attempts| {
-            let first = attempts.begin(&id(0));
+        let (lost, begun) = reports(|attempts| {
+            let first = attempts.begin(&id(0)).unwrap();
             assert!(first.is_some());
-            assert!(attempts.begin(&id(0)).is_none(), "another client");
-            assert!(attempts.begin(&id(1)).is_some(), "another episode");
-            assert!(attempts.begin(&id(10)).is_none(), "an episode that is not recorded");
+            assert!(attempts.begin(&id(0)).unwrap().is_none(), "another client");
+            assert!(attempts.begin(&id(1)).unwrap().is_some(), "another episode");
+            assert!(attempts.begin(&id(10)).unwrap().is_none(), "an episode that is not recorded");
             drop(first);
-            assert!(attempts.begin(&id(0)).is_none(), "after an attempt that was left");
+            assert!(attempts.begin(&id(0)).unwrap().is_none(), "after an attempt that was left");
         });
         assert_eq!(lost, ["1: its client left it before its end", "0: its client left it before its end"]);
+        assert_eq!(begun, [0, 1]);
     }
 
     #[test]
     fn no_other_client_steps_an_episode_during_an_attempt() {
-        let lost = reports(|attempts| {
+        let (lost, begun) = reports(|attempts| {
             assert!(attempts.check_free("step", &id(0), None).is_ok(), "before the attempt");
-            let first = attempts.begin(&id(0));
+            let first = attempts.begin(&id(0)).unwrap();
             assert!(attempts.check_free("step", &id(0), first.as_ref()).is_ok(), "its own client");
             assert!(attempts.check_free("step", &id(0), None).is_err(), "another client");
-            let other = attempts.begin(&id(1));
+            let other = attempts.begin(&id(1)).unwrap();
             assert!(
                 attempts.check_free("step", &id(0), other.as_ref()).is_err(),
                 "a client with an attempt at another episode"
@@ -194,13 +210,13 @@ mod tests {
             drop(first);
             assert!(attempts.check_free("step", &id(0), None).is_ok(), "after the attempt");
         });
-        assert_eq!(lost.len(), 2);
+        assert_eq!((lost.len(), begun.len()), (2, 2));
     }
 
     #[test]
     fn an_episode_that_was_reached_by_a_state_is_not_recorded() {
-        let lost = reports(|attempts| {
-            let first = attempts.begin(&id(0));
+        let (lost, begun) = reports(|attempts| {
+            let first = attempts.begin(&id(0)).unwrap();
             let exclude = |episode, own| attempts.exclude("set_state", &id(episode), own, "restored");
             let error = exclude(0, None).expect_err("another client").to_string();
             assert!(error.starts_with("set_state: task 0, episode 0 is being recorded"), "{error}");
@@ -208,9 +224,10 @@ mod tests {
                 assert!(exclude(episode, first.as_ref()).is_ok());
             }
             drop(first);
-            assert!(attempts.begin(&id(1)).is_none());
+            assert!(attempts.begin(&id(1)).unwrap().is_none());
         });
         assert_eq!(lost, ["0: restored", "1: restored"], "each is reported once");
-        assert!(Attempts::new(None).begin(&id(0)).is_none(), "without a recorder");
+        assert_eq!(begun, [0, 1], "a search is an attempt");
+        assert!(Attempts::new(None).begin(&id(0)).unwrap().is_none(), "without a recorder");
     }
 }

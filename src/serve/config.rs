@@ -32,6 +32,9 @@ impl From<String> for RequestError {
 /// Starts an episode: builds its scene and lets it settle.
 pub(super) type StartEpisode<'a> = Box<dyn Fn(&EpisodeId) -> Result<Episode, RequestError> + Sync + 'a>;
 
+/// Notes that an attempt at an episode has begun.
+type BeginAttempt<'a> = Box<dyn Fn(&EpisodeId) -> Result<(), RequestError> + Sync + 'a>;
+
 /// Reports an episode that can no longer be recorded, with the reason.
 type ReportLost<'a> = Box<dyn Fn(&EpisodeId, &str) + Sync + 'a>;
 
@@ -39,6 +42,8 @@ type ReportLost<'a> = Box<dyn Fn(&EpisodeId, &str) + Sync + 'a>;
 pub struct EpisodeRecorder<'a> {
     /// True if an episode belongs to the run and had no record when the server started.
     pub selects: Box<dyn Fn(&EpisodeId) -> bool + Sync + 'a>,
+    /// Writes that an attempt at a selected episode has begun.
+    pub begin: BeginAttempt<'a>,
     /// Records a selected episode; it is called at most once for each.
     pub record: Box<dyn Fn(FinishedEpisode) -> Result<(), RequestError> + Sync + 'a>,
     /// Reports a selected episode that can no longer be recorded, with the reason.

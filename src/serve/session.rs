@@ -13,7 +13,7 @@ use super::{
     state::{ActionRow, EpisodeState, LiveEpisode},
 };
 use softvt_common::cancel::CancelFlag;
-use softvt_policy::{encode::image_array, msgpack::pack_array};
+use softvt_policy::{encode::image_array, msgpack::pack_array, profile::ObservationSource};
 use softvt_robot::Side;
 
 /// Copies of earlier states per client.
@@ -139,7 +139,7 @@ impl<'a> ClientSession<'a> {
             let (count, is_over) = (live.state.actions.len(), live.episode.outcome().is_some());
             if count == 1 {
                 let id = live.state.id.clone();
-                self.attempt = self.attempts.begin(&id);
+                self.attempt = self.attempts.begin(&id)?;
             }
             if is_over {
                 break;
@@ -170,6 +170,7 @@ impl<'a> ClientSession<'a> {
         height: Option<usize>,
     ) -> Result<Value, RequestError> {
         let (budget, cancel) = (self.render_budget, self.cancel);
+        let (config, attempts) = (self.config, self.attempts);
         let live = self.live("render")?;
         let cameras = &live.episode.sim.scene.cameras;
         let camera = camera.or_else(|| cameras.first().map(|camera| camera.name.clone())).unwrap_or_default();
@@ -186,6 +187,20 @@ impl<'a> ClientSession<'a> {
         let own = cameras.iter().find(|other| other.name == camera);
         let width_px = width.or(own.map(|own| own.width)).unwrap_or_default();
         let height_px = height.or(own.map(|own| own.height)).unwrap_or_default();
+        let is_resized = own.is_some_and(|own| (width_px, height_px) != (own.width, own.height));
+        let is_observed = config.profile.inputs.iter().any(|input| match &input.source {
+            ObservationSource::Camera { camera: observed, .. } => *observed == camera && !is_resized,
+            ObservationSource::Tactile { finger: observed, .. } => finger == Some(*observed),
+            _ => false,
+        });
+        if !(is_observed || config.privileged) && attempts.is_open(&live.state.id) {
+            let message = format!(
+                "render: {camera}: the profile {} does not observe it in this size, and the episode can be recorded; render \
+                 what it observes, or another episode",
+                config.profile.name
+            );
+            return Err(message.into());
+        }
         let pixels = width_px * height_px;
         if (width.is_some() || height.is_some()) && pixels > MAX_RENDER_PIXELS {
             let message = format!(

@@ -1,4 +1,6 @@
-//! Ways to Safety Success that are not earned, one test each: none succeeds. The robot does nothing.
+//! Ways to Safety Success that are not earned, one test each: none succeeds, or tables name it. The robot does nothing.
+
+use softvt::report::{styled_text::TerminalFormat, terminal};
 
 use crate::support::{Project, SOLIDS};
 
@@ -153,4 +155,21 @@ fn the_object_is_its_own_goal() {
 fn the_object_never_moves() {
     let message = refusal(CUBE, r#"softvt.on { object = "floor", target = "cube" }"#);
     assert!(message.contains("\"floor\" never moves"), "{message}");
+}
+
+#[test]
+fn a_goal_that_counts_its_calls_is_reached_without_contact_and_named() {
+    let add = r#"scene:add { name = "slab", asset = solids.slab, at = { 0, 0.1 } } scene:add { name = "cube", asset = solids.cube, at = { 0, -0.1 } }"#;
+    let goal = r#"softvt.predicate { name = "counted", holds = (function() local n = 0 return function() n = n + 1 return n > 8 end end)() }, object = "cube""#;
+    let project = project(add, goal);
+    let result = project.run("x.lua").policy("noop").out("run").finish().result();
+    let verdict = &result.records[0].verdict;
+    assert!(verdict.goal && verdict.goal_untouched, "{verdict:#?}");
+    let told = "the goal was reached in 1 episode without contact of the robot with a target (first: task 0 episode 0)";
+    let table = terminal::table(&result.summary, TerminalFormat::PLAIN);
+    let words: Vec<&str> = table.split_whitespace().collect();
+    assert!(words.join(" ").contains(told), "{table}");
+    let report = project.report(&["run"]);
+    assert_eq!(report.warnings, [format!("run: {told}")]);
+    assert!(report.html.contains(told));
 }

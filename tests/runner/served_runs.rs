@@ -6,6 +6,7 @@ use rmpv::Value;
 use softvt::{
     episode_id::{EpisodeIndex, EpisodeSplit},
     policy::{Action, profile::GripCode},
+    records::summary::SuiteSummary,
     report::{actions, comparison, styled_text::TerminalFormat, terminal},
 };
 
@@ -54,12 +55,14 @@ fn run_episode(project: &Project, client: &mut Client, episode: u32) -> bool {
     client.is_recorded(&recorded(project, "random", episode))
 }
 
-/// A file of a run without the name of its policy.
+/// A file of a run without the name of its policy and the mark of recorded actions.
 fn without_policy(project: &Project, path: &str, policy: &str) -> String {
     project
         .text(path)
         .replace(&format!("\"policy\":\"{policy}\""), "")
         .replace(&format!("\"policy\": \"{policy}\""), "")
+        .replace("\"replayed\":true,", "")
+        .replace("  \"replayed\": true,\n", "")
 }
 
 #[test]
@@ -89,11 +92,13 @@ fn a_served_run_equals_a_run_of_the_same_actions() {
 
     project.run("x.lua").policy("random").episodes(2).out("two").finish();
     let repeated = project.run("x.lua").policy("two").episodes(2).out("repeated").finish().result();
+    assert!(repeated.summary.replayed, "the only other difference");
+    let unmarked = SuiteSummary { replayed: false, ..repeated.summary };
     let table = terminal::table(&summaries[0], TerminalFormat::PLAIN.with_details());
     assert!(table.contains("client") && table.contains("Safety"), "{table}");
     assert_eq!(
         table.replace("client", "replay"),
-        terminal::table(&repeated.summary, TerminalFormat::PLAIN.with_details()),
+        terminal::table(&unmarked, TerminalFormat::PLAIN.with_details()),
         "the table"
     );
     for file in ["episodes.jsonl", "summary.json"] {
@@ -194,6 +199,50 @@ fn only_the_first_attempt_at_an_episode_is_recorded() {
     // An operator may give a lost episode another chance.
     let server = Server::start(&served(&project, 3, "served").resume());
     assert!(run_episode(&project, &mut server.client().0, 1));
+    let (summaries, _) = server.finish();
+    let attempts = |line: &serde_json::Value| line["attempts"].as_u64();
+    let lines = project.lines("served/episodes.jsonl");
+    assert_eq!(lines.iter().map(attempts).collect::<Vec<_>>(), [None, Some(2)], "and the record says so");
+    assert_eq!(summaries[0].repeated_episodes.len(), 1);
+    assert!(project.is_reproduced("served", "0/1"));
+}
+
+#[test]
+fn an_episode_that_can_be_recorded_is_rendered_only_as_the_profile_observes_it() {
+    let project = project();
+    let server = Server::start(&served(&project, 2, "served"));
+    let (mut client, _) = server.client();
+    let actions = recorded(&project, "random", 0);
+    let render = |camera: &str, edge: Option<u64>| {
+        let size = edge.map(Value::from).unwrap_or(Value::Nil);
+        map(&[
+            ("type", "render".into()),
+            ("camera", camera.into()),
+            ("width", size.clone()),
+            ("height", size),
+        ])
+    };
+    let check = |client: &mut Client| {
+        for (camera, edge) in [("left", None), ("wrist", Some(1400)), ("third_person", Some(64))] {
+            let message = client.refused(&render(camera, edge));
+            let expected = format!(
+                "render: {camera}: the profile vision does not observe it in this size, and the episode can be recorded"
+            );
+            assert!(message.starts_with(&expected), "{message}");
+        }
+        let answer = client.ask(&render("wrist", None));
+        assert_eq!(get(&answer, "type").as_str(), Some("render"), "{answer}");
+    };
+    client.reset(0);
+    check(&mut client);
+    client.step(&actions[..3]);
+    check(&mut client);
+    assert!(client.is_recorded(&actions[3..]));
+    for (camera, edge) in [("left", None), ("wrist", Some(100))] {
+        assert_eq!(get(&client.ask(&render(camera, edge)), "type").as_str(), Some("render"), "it is over");
+    }
+    client.reset(5);
+    assert_eq!(get(&client.ask(&render("left", None)), "type").as_str(), Some("render"), "not of the run");
 }
 
 #[test]

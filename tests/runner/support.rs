@@ -17,7 +17,7 @@ use softvt::{
         comparison::{self, Comparison},
         condition_table::ConditionTable,
         page,
-        run_summary::summarize_runs,
+        run_summary::{summarize_runs, warnings},
         shard_merge,
         stored_run::{self, StoredRun},
         tables::{ResultTable, all_tables},
@@ -108,8 +108,7 @@ impl Project {
         let stored =
             runs.iter().flat_map(|run| self.stored(run).unwrap_or_else(|message| panic!("{message}")));
         let summaries = summarize_runs(stored.collect());
-        let warnings = summaries.iter().flat_map(|summary| summary.run.warnings());
-        let warnings = warnings.map(|warning| self.relative(warning)).collect();
+        let warnings = warnings(&summaries).into_iter().map(|warning| self.relative(warning)).collect();
         let markdown: Vec<String> = all_tables(&summaries).iter().map(ResultTable::markdown).collect();
         let html = page::page(&summaries, &page::Thumbnails::new(), &self.path("page"));
         Report { html: self.relative(html), markdown: self.relative(markdown.join("\n")), warnings }

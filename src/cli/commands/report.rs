@@ -10,8 +10,11 @@ use crate::{
     output::{Console, eprint_notice, print, print_json, print_table, terminal_format},
 };
 use softvt_report::{
-    comparison, policy_ranking::PolicyRanking, report_files, run_summary::summarize_runs, shard_merge,
-    stored_run, terminal,
+    comparison,
+    policy_ranking::PolicyRanking,
+    report_files,
+    run_summary::{summarize_runs, warnings},
+    shard_merge, stored_run, terminal,
 };
 use softvt_runner::{Observer, thumbnails};
 
@@ -70,8 +73,7 @@ pub(super) fn report(args: &ReportArgs) -> Result<(), CliError> {
         stored.extend(stored_run::load(dir)?);
     }
     let summaries = summarize_runs(stored);
-    let of_runs = summaries.iter().flat_map(|summary| summary.run.warnings());
-    for warning in of_runs.chain(comparison::limit_warnings(summaries.iter().map(|summary| &summary.run))) {
+    for warning in warnings(&summaries) {
         eprint_notice(warning);
     }
     let observer: Arc<dyn Observer> = Arc::new(Console::default());

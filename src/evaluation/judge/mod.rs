@@ -256,6 +256,8 @@ pub struct Judge {
     holds: [Vec<bool>; 2],
     reached_s: Option<f64>,
     is_reached_v1: bool,
+    /// True if the robot has pressed on a target.
+    is_touched: bool,
     opening: OpeningMonitor,
     /// True if another object than a target was lifted first; `None` before.
     is_other_first: Option<bool>,
@@ -286,6 +288,7 @@ impl Judge {
             predicates,
             reached_s: None,
             is_reached_v1: false,
+            is_touched: false,
             opening: OpeningMonitor::default(),
             scores: Vec::with_capacity(config.max_steps / config.steps_per_control as usize),
             steps: 0,
@@ -333,6 +336,7 @@ impl Judge {
         let step = StepContext { config, evidence, is_opening };
         for (target, own) in self.targets.iter_mut().zip(evidence.targets) {
             target.observe(&step, own);
+            self.is_touched |= target.was_touched;
         }
         self.observe_goal(evidence, is_last);
     }
@@ -407,6 +411,7 @@ impl Judge {
         let mut verdict = Verdict {
             goal,
             goal_time_s: self.reached_s.filter(|_| goal),
+            goal_untouched: goal && !self.is_touched,
             goal_v1: valid && self.is_reached_v1,
             goal_parts: if parts.len() > 1 { parts } else { Vec::new() },
             no_drop: drop.is_none(),

@@ -394,6 +394,22 @@ fn the_first_contact_with_another_object_is_kept() {
 }
 
 #[test]
+fn a_goal_that_is_reached_without_contact_of_the_robot_is_marked() {
+    let verdict = |is_touched: bool| {
+        let mut replay = Replay::new(config());
+        if is_touched {
+            replay.steps(1, |step| step.hand_force_n = 1.0);
+        }
+        replay.rest(30, 0.0);
+        replay.verdict(Outcome::Completed)
+    };
+    assert!(verdict(false).goal && verdict(false).goal_untouched);
+    assert!(verdict(true).goal && !verdict(true).goal_untouched);
+    let missed = Replay::new(config()).verdict(Outcome::Budget);
+    assert!(!missed.goal && !missed.goal_untouched);
+}
+
+#[test]
 fn the_series_of_deformation_is_summarised() {
     let mut replay = Replay::new(config());
     for d in [0.4, 1.2, 1.6, 0.8] {

@@ -12,6 +12,7 @@ use super::{
     paired_stats::d_over_tau,
     record::{EpisodeRecord, UnreachableCommand},
 };
+use softvt_common::{episode_id::EpisodeIndex, text::counted};
 use softvt_evaluation::{
     category::EpisodeCategory,
     stage::TaskStage,
@@ -178,6 +179,17 @@ pub struct InvalidEpisode {
     pub reason: String,
 }
 
+/// Episode of more than one attempt.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct RepeatedEpisode {
+    /// Index of the task.
+    pub task: usize,
+    /// Index of the episode in the task.
+    pub episode: u32,
+    /// Number of attempts.
+    pub attempts: u32,
+}
+
 /// Commands of the policy that were not executed as given.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct CommandCounts {
@@ -227,6 +239,9 @@ pub struct SuiteSummary {
     pub policy: String,
     /// True if the policy saw the true state in any episode, as experts do.
     pub privileged: bool,
+    /// True if the actions of any episode are those of a recorded run.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub replayed: bool,
     /// True if the policy saw the true forces at the pads in any episode; no real sensor gives them.
     pub force_observed: bool,
     /// True if Safety Success needed NoSlip.
@@ -248,6 +263,12 @@ pub struct SuiteSummary {
     /// Invalid episodes, in order.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub invalid_episodes: Vec<InvalidEpisode>,
+    /// Episodes of more than one attempt, in order.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub repeated_episodes: Vec<RepeatedEpisode>,
+    /// Episodes whose goal was reached although the robot never touched a target, in order.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub goals_untouched: Vec<EpisodeIndex>,
 }
 
 impl GroupScores {
@@ -411,13 +432,19 @@ impl SuiteSummary {
             };
             Some(InvalidEpisode { task, episode, reason })
         };
+        let repeated = |r: &&EpisodeRecord| {
+            let EpisodeIndex { task, episode } = r.header.id.index();
+            r.stats.attempts.map(|attempts| RepeatedEpisode { task, episode, attempts })
+        };
+        let untouched = records.iter().filter(|r| r.verdict.goal_untouched);
         let by_task = grouped(&records, |r| r.header.id.task);
         let mut scores = GroupScores::from_records(&records);
         scores.add_bootstrap(&by_task);
         Self {
             suite: suite.into(),
             policy: policy.into(),
-            privileged: records.iter().any(|r| r.header.privileged),
+            privileged: records.iter().any(|r| r.header.is_privileged()),
+            replayed: records.iter().any(|r| r.header.replayed),
             force_observed: records.iter().any(|r| r.stats.force_observed),
             no_slip_required: records.iter().any(|r| r.verdict.slip_ok.is_some()),
             commands: CommandCounts::from_records(&records),
@@ -427,18 +454,59 @@ impl SuiteSummary {
             by_asset: grouped(&records, |r| r.header.asset.clone()).into_iter().map(asset_scores).collect(),
             gave_up: records.iter().filter_map(aborted).collect(),
             invalid_episodes: records.iter().filter_map(invalid).collect(),
+            repeated_episodes: records.iter().filter_map(repeated).collect(),
+            goals_untouched: untouched.map(|r| r.header.id.index()).collect(),
         }
     }
 
     /// Label of the method in tables, as [`method_label`].
     pub fn method_label(&self) -> String {
-        method_label(&self.policy, self.privileged, self.force_observed)
+        method_label(&self.policy, self.marks())
+    }
+
+    /// What to say about how the episodes came about: repeated attempts, and goals without contact of the robot.
+    pub fn attempt_notes(&self) -> Vec<String> {
+        let mut notes = Vec::new();
+        let (repeated, untouched) = (&self.repeated_episodes, &self.goals_untouched);
+        if let Some(most) = repeated.iter().max_by_key(|episode| episode.attempts) {
+            let index = EpisodeIndex { task: most.task, episode: most.episode };
+            notes.push(format!(
+                "{} took more than one attempt (most: {index}, {}): the policy or the user broke off the others",
+                counted(repeated.len(), "episode"),
+                most.attempts
+            ));
+        }
+        if let Some(first) = untouched.first() {
+            notes.push(format!(
+                "the goal was reached in {} without contact of the robot with a target (first: {first})",
+                counted(untouched.len(), "episode")
+            ));
+        }
+        notes
+    }
+
+    /// What the method knew beyond what a robot measures, and whose actions it repeated.
+    pub fn marks(&self) -> MethodMarks {
+        let Self { privileged, replayed, force_observed, .. } = *self;
+        MethodMarks { privileged, replayed, force_observed }
     }
 }
 
-/// Name of a policy, marked if it saw the true state ("privileged") or the true pad forces ("force_observed").
-pub fn method_label(policy: &str, privileged: bool, force_observed: bool) -> String {
-    let marks = [(privileged, "privileged"), (force_observed, "force_observed")];
+/// What tables add to the name of a policy.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct MethodMarks {
+    /// It saw the true state.
+    pub privileged: bool,
+    /// It repeated the actions of a recorded run.
+    pub replayed: bool,
+    /// It saw the true pad forces.
+    pub force_observed: bool,
+}
+
+/// Name of a policy with its marks: "expert (privileged)".
+pub fn method_label(policy: &str, marks: MethodMarks) -> String {
+    let MethodMarks { privileged, replayed, force_observed } = marks;
+    let marks = [(privileged, "privileged"), (replayed, "replayed"), (force_observed, "force_observed")];
     let marks: Vec<&str> = marks.into_iter().filter_map(|(is, mark)| is.then_some(mark)).collect();
     if marks.is_empty() { policy.to_owned() } else { format!("{policy} ({})", marks.join(", ")) }
 }

@@ -134,6 +134,7 @@ pub(super) fn chips(runs: &[RunSummary]) -> Markup {
                     ": access to ground-truth state, which no robot has"
                 }
             }
+            @if runs.iter().any(|run| run.summary.replayed) { li { "replayed: actions of recorded runs" } }
             @if runs.iter().any(|run| run.summary.force_observed) { li { "force_observed: true forces at the pads, which no real sensor measures" } }
             @if most > 0 {
                 li { "n = " (few) @if few < most { " to " (most) } " per run" @if few < FEW_EPISODES { ": intervals are wide" } }

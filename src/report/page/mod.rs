@@ -24,11 +24,10 @@ use softvt_benchmark::run_changes::RunChanges;
 use softvt_common::text::{counted, escape_control};
 
 use super::{
-    comparison::limit_warnings,
     condition_effects::{ConditionEffects, condition_effects, effects_table},
     report_files::MARKDOWN,
     run_folder::{RUN, SUMMARY},
-    run_summary::RunSummary,
+    run_summary::{RunSummary, warnings},
     tables::{
         ResultTable, TEXT_COLUMNS, bootstrap_table, command_table, crushed_table, deformation_table,
         grip_table, kappa_table, main_table, metric_table, stage_table, task_table,
@@ -62,8 +61,7 @@ pub fn page(runs: &[RunSummary], thumbnails: &Thumbnails, out: &Path) -> String 
                     p.lead { (counted(episodes, "episode")) " in " (counted(runs.len(), "run")) " · seed " (seeds) " · softvt " (env!("CARGO_PKG_VERSION")) }
                     (headline::headline(runs, &effects))
                     (headline::chips(runs))
-                    @for warning in runs.iter().flat_map(|run| run.run.warnings()) { p.warning { (warning) } }
-                    @for warning in limit_warnings(runs.iter().map(|run| &run.run)) { p.warning { (warning) } }
+                    @for warning in warnings(runs) { p.warning { (warning) } }
                 }
                 nav aria-label="Contents" {
                     a href="#results" { "Results" }

@@ -426,7 +426,7 @@ fn join(cells: &[String], escape: fn(&str) -> String, separator: &str) -> String
 }
 
 /// Escapes text for markdown.
-fn escape_markdown(text: &str) -> String {
+pub(super) fn escape_markdown(text: &str) -> String {
     let letters: Vec<char> = text.chars().collect();
     let mut out = String::with_capacity(text.len());
     for (i, &c) in letters.iter().enumerate() {

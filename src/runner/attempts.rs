@@ -1,0 +1,89 @@
+//! Attempts at the episodes of a run whose policy is outside of softvt: a server, a client of `softvt serve`, or a
+//! policy in Rust. Such a policy can break off an episode that it would lose, and get it again when the run is resumed.
+//!
+//! An attempt begins with the first action that is executed. It is on the disk before the second, and the record of the
+//! episode has the number of its attempts. A policy of softvt or in Lua does the same in each attempt; none is counted.
+
+use std::{
+    collections::BTreeMap,
+    path::{Path, PathBuf},
+    sync::Mutex,
+};
+
+use softvt_common::{
+    episode_id::EpisodeIndex,
+    files,
+    journal::{Journal, whole_lines},
+    parallel::lock,
+};
+use softvt_report::run_folder::{ATTEMPTS, of_folder};
+
+use crate::error::RunError;
+
+/// The attempts at the episodes of one run, of all its sessions. Their file exists until the run is complete.
+pub(crate) struct Attempts {
+    path: PathBuf,
+    begun: Mutex<BegunAttempts>,
+}
+
+#[derive(Default)]
+struct BegunAttempts {
+    file: Option<Journal>,
+    counts: BTreeMap<EpisodeIndex, u32>,
+}
+
+impl Attempts {
+    /// The attempts of earlier sessions in the folder of a run.
+    ///
+    /// # Errors
+    /// Their file cannot be read.
+    pub(crate) fn open(dir: &Path) -> Result<Self, RunError> {
+        let (path, mut begun) = (dir.join(ATTEMPTS), BegunAttempts::default());
+        if path.is_file() {
+            let (mut file, bytes) = Journal::resume(&path).map_err(of_folder(dir, ATTEMPTS))?;
+            file.keep_whole_lines(&bytes)?;
+            begun.file = Some(file);
+            for (number, line) in whole_lines(&bytes) {
+                let index = serde_json::from_slice(line).map_err(|error| {
+                    RunError::input(format!("{}:{number}: not an attempt: {error}", path.display()))
+                })?;
+                *begun.counts.entry(index).or_insert(0) += 1;
+            }
+        }
+        Ok(Self { path, begun: Mutex::new(begun) })
+    }
+
+    /// Writes that an attempt at an episode has begun.
+    ///
+    /// # Errors
+    /// The file cannot be written.
+    pub(crate) fn begin(&self, index: EpisodeIndex) -> Result<(), RunError> {
+        let mut begun = lock(&self.begun);
+        *begun.counts.entry(index).or_insert(0) += 1;
+        let line = files::json_lines(&self.path, [index])?;
+        let file = match begun.file.take() {
+            Some(file) => file,
+            None => Journal::resume(&self.path).map_err(of_folder(&self.path, ATTEMPTS))?.0,
+        };
+        Ok(begun.file.insert(file).append(&line)?)
+    }
+
+    /// Number of attempts at an episode, if there were several.
+    pub(crate) fn several(&self, index: EpisodeIndex) -> Option<u32> {
+        lock(&self.begun).counts.get(&index).copied().filter(|count| *count > 1)
+    }
+
+    /// True before the first attempt at any episode.
+    pub(crate) fn is_empty(&self) -> bool {
+        lock(&self.begun).counts.is_empty()
+    }
+
+    /// Removes the file of a complete run, whose records have the numbers.
+    ///
+    /// # Errors
+    /// It cannot be removed.
+    pub(crate) fn remove(&self) -> Result<(), RunError> {
+        lock(&self.begun).file = None;
+        Ok(files::remove_if_present(&self.path)?)
+    }
+}
