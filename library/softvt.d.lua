@@ -116,7 +116,7 @@
 
 ---A number of each episode, beside the verdict: of the true state, which policies do not see.
 ---@class softvt.Metric
----@field name string Name in records and tables, with its unit, as tilt_deg.
+---@field name string Name in records and tables, with its unit, as tilt_deg; none that records have already, as safety.
 ---@field of fun(scene: softvt.SceneState, step: table): number? Returns the value after a control step, or nil where it has none. `step` is a row of the trace (docs/results.md): forces of the pads, D of each object, what touches what.
 ---@field over? "last"|"max"|"min"|"mean" How the values of an episode become one: "last", "max", "min" or "mean". Default "last".
 

@@ -14,7 +14,7 @@ fn project(metrics: &str) -> Project {
 }
 
 const STEPS: &str = r#"
-softvt.metric { name = "steps", of = function(_, step) return step.step end },
+softvt.metric { name = "count", of = function(_, step) return step.step end },
 softvt.metric { name = "first", over = "min", of = function(_, step) return step.time_s end },
 softvt.metric { name = "rest_m", over = "mean", of = function(scene) return scene:object("cube").centre[3] end },
 softvt.metric { name = "force_n", over = "max", of = function(_, step) if step.pad_force_n[1] > 0 then return step.pad_force_n[1] end end },
@@ -29,10 +29,10 @@ fn metrics_of_a_suite_are_in_records_and_summaries_and_change_nothing_else() {
     assert_eq!(record.verdict, plain.verdict);
     assert_eq!(record.stats.state_hash, plain.stats.state_hash);
     let metrics = &record.stats.metrics;
-    assert_eq!(metrics["steps"], Some(f64::from(record.stats.steps)));
+    assert_eq!(metrics["count"], Some(f64::from(record.stats.steps)));
     assert_eq!(metrics["first"], Some(0.05));
     assert!((0.0..0.2).contains(&metrics["rest_m"].unwrap()), "{metrics:?}");
-    assert_eq!(summary.scores.metrics["steps"].mean, metrics["steps"]);
+    assert_eq!(summary.scores.metrics["count"].mean, metrics["count"]);
     assert_eq!(summary.scores.metrics["force_n"].n, usize::from(metrics["force_n"].is_some()));
 }
 
@@ -72,6 +72,13 @@ fn wrong_metrics_are_refused() {
     let good = metric("name = 'm', of = function() end");
     assert_snapshot!(refusal(&format!("{good}, {good}")), @r#"x.lua:9: suite.metrics: two are named "m"; give each a name of its own"#);
     assert_snapshot!(refusal(&metric("name = 'm', over = 'sum', of = function() end")), @r#"x.lua:9: metric.over: expected one of "last", "max", "min", "mean", got "sum""#);
+    for name in ["safety", "goal", "d_peak", "tau", "privileged", "steps", "attempts"] {
+        let message = refusal(&metric(&format!("name = '{name}', of = function() end")));
+        assert_eq!(
+            message,
+            format!("x.lua:9: metric.name: {name:?} is a field of every record; give another name")
+        );
+    }
     assert_snapshot!(refusal(&metric("name = 'm'")), @"x.lua:9: metric.of: missing; expected a function, fun(scene: softvt.SceneState, step: table): number?");
     assert_snapshot!(refusal("function() end"), @"x.lua:9: suite.metrics[1]: expected the result of softvt.metric{…}, got a function");
 }

@@ -17,6 +17,7 @@ use softvt_benchmark::{
     metric::{Metric, Reduction},
     variation::{FactorRange, HiddenRanges, VariationRanges},
 };
+use softvt_records::record_check::is_record_key;
 
 /// Type of a layout's function.
 const BUILD: Type = Type::Function("fun(scene: softvt.Scene, rng: softvt.Rng)");
@@ -128,8 +129,8 @@ record! {
         window_ratio: [f64; 2] = Type::Vector(2, "", Range::closed(1.0, 1000.0));
     }
     /// A number of each episode, beside the verdict: of the true state, which policies do not see.
-    MetricSpec: "softvt.Metric" as "metric", constructor "softvt.metric" {
-        /// Name in records and tables, with its unit, as tilt_deg.
+    MetricSpec: "softvt.Metric" as "metric", constructor "softvt.metric", relations check_metric {
+        /// Name in records and tables, with its unit, as tilt_deg; none that records have already, as safety.
         name: String = Type::Name;
         /// Returns the value after a control step, or nil where it has none. `step` is a row of the trace
         /// (docs/results.md): forces of the pads, D of each object, what touches what.
@@ -305,6 +306,16 @@ fn check_shift_range(lua: &Lua, record: &Record, table: &Table) -> mlua::Result<
         return Ok(());
     };
     Err(error_at_key(lua, record.label, &ValidationError { path: vec![key.into()], message }))
+}
+
+/// Refuses the name of a measure of the verdict, which tables would show beside it.
+fn check_metric(lua: &Lua, record: &Record, table: &Table) -> mlua::Result<()> {
+    let name = table.raw_get::<String>("name")?;
+    if !is_record_key(&name) {
+        return Ok(());
+    }
+    let message = format!("{name:?} is a field of every record; give another name");
+    Err(error_at_key(lua, record.label, &ValidationError { path: vec!["name".into()], message }))
 }
 
 fn check_variation(lua: &Lua, record: &Record, table: &Table) -> mlua::Result<()> {
