@@ -340,7 +340,7 @@ world frame (z up) unless stated otherwise.
 Scripts are Lua 5.4 in a sandbox, with `coroutine`, `math`, `string`, `table` and `utf8`, without `io`, `os`, `debug`,
 `package` and byte code. `require \"a.b\"` searches for `scripts/a/b.lua`, `suites/a/b.lua` and `a/b.lua` in the script's
 folder, its parent folder and the current folder, then in the library inside the binary. `math.random` is seeded by the run.
-`pairs` iterates over numbers, strings and booleans in order; the order of other keys, and of `next`, is not defined.
+`pairs` and `next` go over numbers, strings and booleans in order. Several other keys in one table have none: an error.
 Reading a variable that is not defined is an error; `rawget(_G, name)` returns nil instead.
 `tostring` returns the type of a table or function, never an address. `print` writes to standard error, up to 1 MiB. Memory
 and time are limited: 256 MiB of Lua values, 512 MiB of images, shapes and masks, shapes of at most 2000 parts, masks of at

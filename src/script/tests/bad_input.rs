@@ -546,6 +546,24 @@ fn text_never_holds_an_address_and_pairs_has_one_order() {
 }
 
 #[test]
+fn next_has_the_order_of_pairs_and_keys_without_an_order_are_refused() {
+    let text = "local t = {} for i = 40, 1, -1 do t['k' .. i] = i end t[3] = 1 t[true] = 1\n\
+                local first, second = {}, {} for k, v in pairs(t) do first[#first + 1] = tostring(k) .. v end\n\
+                for k, v in next, t do second[#second + 1] = tostring(k) .. v if v == 7 then t[k] = nil end end\n\
+                assert(#first == 42 and table.concat(first, ' ') == table.concat(second, ' '))\n\
+                assert(next(t, 'k6') == 'k8' and next(t, 3) == 'k1' and next(t, true) == nil and next {} == nil)\n\
+                local one = { [{}] = 1, a = 2 } local n = 0 for _, v in pairs(one) do n = 10 * n + v end assert(n == 21)\n\
+                local two = { [{}] = 1, [print] = 2 }\n";
+    let expected =
+        "several keys are neither numbers, strings nor booleans, and have no order; keep a list of them";
+    for name in ["pairs", "next"] {
+        assert_eq!(error_of(&format!("{text}{name}(two)")), format!("suites/x.lua:8: {name}: {expected}"));
+    }
+    let missing = error_of("local t = { a = 1 }\nnext(t, 'b')");
+    assert_eq!(missing, "suites/x.lua:2: next: the table has no such key");
+}
+
+#[test]
 fn math_random_is_the_same_in_every_run() {
     let draw = || error_of("error(math.random() .. ' ' .. math.random(10) .. ' ' .. math.random(-3, 3), 0)");
     assert_eq!(draw(), draw());

@@ -81,28 +81,29 @@ local function before(a, b)
   return a < b
 end
 
--- Keys in an order that does not depend on hashes: numbers, strings, booleans, then the rest as Lua has them.
-local function ordered_keys(object)
-  local keys, rest, n, m, in_order = {}, {}, 0, 0, true
+-- Keys in an order that does not depend on hashes: numbers, strings, booleans, then one other. Several others have
+-- none: their hashes are addresses.
+local function ordered_keys(object, name, level)
+  local keys, rest, n, in_order = {}, nil, 0, true
   for key in raw_next, object do
     if rank[type(key)] then
       if n > 0 and in_order and not before(keys[n], key) then in_order = false end
       n = n + 1
       keys[n] = key
+    elseif rest == nil then
+      rest = key
     else
-      m = m + 1
-      rest[m] = key
+      local message = "%s: several keys are neither numbers, strings nor booleans, and have no order; keep a list of them"
+      raw_error(raw_format(message, name), level)
     end
   end
   if not in_order then sort(keys, before) end
-  for i = 1, m do
-    keys[n + i] = rest[i]
-  end
+  keys[n + 1] = rest
   return keys
 end
 
-local function iterate(object)
-  local keys, i = ordered_keys(object), 0
+local function iterate(object, name)
+  local keys, i = ordered_keys(object, name, 4), 0
   return function()
     while true do
       i = i + 1
@@ -119,12 +120,39 @@ function pairs(object)
   local own = type(meta) == "table" and rawget(meta, "__pairs")
   if own then return own(object) end
   object = host.list("pairs", object)
-  return iterate(object), object, nil
+  local each = iterate(object, "pairs")
+  return each, object, nil
+end
+
+-- The iteration by `next` of each table: its keys in order, and the place of the last one that was returned.
+local walks = raw_setmetatable({}, { __mode = "k" })
+
+-- Lua's own goes by hashes, which differ from run to run.
+function next(object, key)
+  if type(object) ~= "table" then
+    raw_error("bad argument #1 to 'next' (table expected, got " .. type(object) .. ")", 2)
+  end
+  local walk = walks[object]
+  if key == nil or not walk or walk.keys[walk.at] ~= key then
+    walk = { keys = ordered_keys(object, "next", 3), at = 0 }
+    while key ~= nil and walk.keys[walk.at] ~= key do
+      walk.at = walk.at + 1
+      if walk.keys[walk.at] == nil then raw_error("next: the table has no such key", 2) end
+    end
+    walks[object] = walk
+  end
+  repeat
+    walk.at = walk.at + 1
+    key = walk.keys[walk.at]
+  until key == nil or rawget(object, key) ~= nil
+  if key == nil then return nil end
+  return key, rawget(object, key)
 end
 
 host.sorted = function(object)
   object = host.list("softvt.sorted", object)
-  return iterate(object)
+  local each = iterate(object, "softvt.sorted")
+  return each
 end
 
 function math.randomseed()
