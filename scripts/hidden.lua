@@ -1,5 +1,5 @@
 -- What the hidden suites have in common: how stiff, brittle, heavy and slippery an object is does not show. No constant
--- number is safe; the grip has to be found by trial. The teacher feels it; sight and the load of the arm find it as well.
+-- number is safe; the grip has to be found by trial. The teacher feels it; sight and the load of the arm find it too.
 local pick_place = require "experts.pick_place"
 local shifts = require "shifts"
 

@@ -3,8 +3,8 @@
 -- of the size: the number that is inside of the safe windows of the largest share of the instances that the suite
 -- draws. A policy without touch can do that much.
 --
--- look-retry and weigh are no such bounds: they lift, look whether the object follows or weigh what hangs on the arm, and
--- close further.
+-- look-retry and weigh are no such bounds: they lift, look whether the object follows or weigh what hangs on the arm,
+-- and close further.
 local grasp = require "experts.grasp"
 local hand = require "experts.hand"
 local trial_constants = require "experts.trial_constants"
@@ -29,8 +29,8 @@ local CONTACT_GAP = 0.75 * DRIVE_RESOLUTION
 local TRIAL_HEIGHT, TRIAL_SPEED = 0.004, 0.05
 -- Time after which the arm has come to rest from its approach to a micrometre, s.
 local REST = 1
--- Error of a look, m (1 sd). The wrist camera has 2 mm per pixel at 128 pixels; the position of an outline some 25 pixels
--- wide is known to a third of a pixel.
+-- Error of a look, m (1 sd). The wrist camera has 2 mm per pixel at 128 pixels; the position of an outline some 25
+-- pixels wide is known to a third of a pixel.
 local LOOK_ERROR = 0.0007
 -- Share of the sample that needs less indentation than the loosest grip that trials start from.
 local LOOSEST = 0.03
@@ -301,8 +301,8 @@ local TRIALS = {
   end,
 }
 
--- Starts loose for the seen size, lifts by some millimetres, and closes further until the object is held; then closes to
--- the least grip that held and a margin. Repeated grasps begin where the last one ended.
+-- Starts loose for the seen size, lifts by some millimetres, and closes further until the object is held; then closes
+-- to the least grip that held and a margin. Repeated grasps begin where the last one ended.
 local function by_trial(name, instances, object)
   local constants, depths, tightest = trial_constants[name], {}, 0
   for index, one in ipairs((with_windows(instances, object.name, INSTANCES))) do

@@ -140,7 +140,8 @@ impl StoredRun {
         }
     }
 
-    /// True if the policy keeps one number constant, by what shows of an object. Runs of earlier versions do not say so.
+    /// True if the policy keeps one number constant, by what shows of an object. Runs of earlier versions do not say
+    /// so.
     pub fn is_blind_bound(&self) -> bool {
         self.manifest["blind"].as_bool() == Some(true)
     }

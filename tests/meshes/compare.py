@@ -15,27 +15,27 @@ FRANKA = "genesis/assets/xml/"
 HAND = "myosuite/envs/myo/assets/MPL_sim/meshes/mplL/"
 # Some have seams of texture coordinates and polygons (OBJ), cracks (wristy_left) and y up (GLB).
 SOLIDS = [
+    "genesis/assets/meshes/bolt_nut/bolt.stl",
     "genesis/assets/meshes/bolt_nut/nut.stl",
-    "genesis/assets/meshes/camera/camera.glb",
     "genesis/assets/meshes/chopping-board/source/chopping_board.glb",
     "genesis/assets/meshes/cross_cutter.obj",
     "genesis/assets/meshes/sphere.obj",
     "genesis/assets/meshes/wooden_sphere_OBJ/wooden_sphere.obj",
     "genesis/assets/meshes/worm/worm.obj",
     "genesis/assets/tower/ball.glb",
-    "genesis/assets/tower/base_pole.glb",
     BULLET + "3763/textured_objs/original-2_vhacd.obj",
     BULLET + "blue_box/assets/part_1.stl",
     BULLET + "kuka_iiwa/meshes/finger_tip_left.stl",
     BULLET + "panda_bullet/meshes/collision/link1.obj",
-    BULLET + "panda_bullet/meshes/visual/finger.obj",
     BULLET + "shadow_hand/meshes/collision/palm.stl",
     BULLET + "wheel/wheel.obj",
     FRANKA + "franka_emika_panda/assets/finger_0.obj",
+    FRANKA + "franka_emika_panda/assets/link5_collision_0.obj",
     FRANKA + "franka_sim/meshes/visual/link1.stl",
     FRANKA + "tet.obj",
     FRANKA + "thin_cube.obj",
     HAND + "humerus_lower_top_link-cvx.stl",
+    HAND + "index0_left.stl",
     HAND + "palm_left.stl",
     HAND + "wristy_left.stl",
     "myosuite/envs/myo/assets/pingpong.obj",
@@ -62,7 +62,7 @@ for name, path in names.items():
     shutil.copy(packages / path, folder / name)
 (folder / "files.lua").write_text("return {" + ", ".join(map(json.dumps, names)) + "}\n")
 run = subprocess.run([softvt, "meshes.lua", "--json"], cwd=folder, check=True, capture_output=True, text=True)
-rows = {row["file"]: row for row in map(json.loads, run.stdout.splitlines()) if "file" in row}
+rows = {row["file"]: row for row in map(json.loads, run.stdout.splitlines())}
 wrong = []
 for name, path in names.items():
     row = rows[name]

@@ -28,8 +28,8 @@ pub fn path_acceleration() -> f64 {
     10.0 / 3f64.sqrt() * LIFT.0 / (LIFT.1 * LIFT.1)
 }
 
-/// Peak acceleration of the tool, m/s², by second differences over the physics step: a lift along the quintic, commanded
-/// at 20 Hz.
+/// Peak acceleration of the tool, m/s², by second differences over the physics step: a lift along the quintic that is
+/// commanded at 20 Hz.
 pub fn hand_acceleration(rate: f64) -> f64 {
     let params = PhysicsParams { dt: 1.0 / rate, ..PhysicsParams::default() };
     let mut world = World::new(params, GRAVITY * Vec3::new(0.0, 0.0, -1.0));

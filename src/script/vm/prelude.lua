@@ -93,8 +93,8 @@ local function ordered_keys(object, name, level)
     elseif rest == nil then
       rest = key
     else
-      local message = "%s: several keys are neither numbers, strings nor booleans, and have no order; keep a list of them"
-      raw_error(raw_format(message, name), level)
+      local kinds = "neither numbers, strings nor booleans, and have no order"
+      raw_error(raw_format("%s: several keys are %s; keep a list of them", name, kinds), level)
     end
   end
   if not in_order then sort(keys, before) end
