@@ -6,7 +6,7 @@
 ---@field name string Name in results; part of the seed.
 ---@field object_type "deformable"|"rigid" Mechanics of the objects.
 ---@field tasks_differ_in "object"|"spatial" Difference between the tasks.
----@field needs? "nothing"|"size"|"touch" What a controller has to know of an instance to grip it safely, as softvt list suites prints it: "nothing" but its kind, its "size", or what only "touch" tells. softvt scripts/blind_bounds.lua estimates it.
+---@field needs? "nothing"|"size"|"trial" What a controller has to know of an instance to grip it safely, as softvt list suites prints it: "nothing" but its kind, its "size", or what only a "trial" tells. softvt scripts/blind_bounds.lua estimates it.
 ---@field episodes? integer Default number of episodes per task. Expects a whole number in 1..1000000. Default 5.
 ---@field tasks softvt.Task[] The tasks, in order.
 ---@field shifts? softvt.Shift[] Changes of the scene that a run can request.
@@ -680,18 +680,18 @@
 
 ---Settings; those that are left out keep their values. docs/settings.md lists all.
 ---@class softvt.Settings.physics
----@field dt? number Time step. Control runs at 20 Hz independently of it, so it must divide 0.05 s in the benchmark. Limits and grip windows are calibrated with the default: below 5 ms, motion is damped less, and the loosest grips of the expert slip. Expects a number in 0.0001..0.05 (s). Default 0.016666666666666666.
----@field rayleigh_mass? number Mass-proportional Rayleigh damping of soft bodies (α, as air drag). The paper's engine uses 2.5. Expects a number of 0 or more (1/s). Default 0.
+---@field dt? number Time step. Control runs at 20 Hz independently of it, so it must divide 0.05 s in the benchmark. Limits and grip windows are calibrated with the default. A smaller step damps the motion of soft bodies less; that of the hand does not depend on it. Expects a number in 0.0001..0.05 (s). Default 0.016666666666666666.
+---@field rayleigh_mass? number Mass-proportional Rayleigh damping of soft bodies (α, as air drag). The paper's engine uses 2.5. Expects a number in 0..1000 (1/s). Default 0.
 ---@field rayleigh_stiffness? number Stiffness-proportional Rayleigh damping of soft bodies (β). Implicit Euler adds its step: motion is damped by β + `dt`, by default 21.7 ms, so that a smaller step damps less. Equilibria do not depend on it. Expects a number in 0..1 (s). Default 0.005.
----@field dissipation_time? number Dissipation time scale τ_d of contact springs, s (Castro et al. 2022). A surface that recedes faster than the springs relax is released; the value is small compared with `dt`, so that friction does not lift a sliding surface. Expects a number of 0 or more (s). Default 0.005.
----@field rigid_modulus? number Normal contact stiffness per area of nearly rigid colliders, Pa/m: near rigid for Young's moduli up to 1 MPa. Expects a number above 0 (Pa/m). Default 1e9.
----@field shear_ratio? number Tangential over normal contact stiffness. Mindlin (1949) gives 0.5 to 0.8 for solids; creep does not depend on it. Expects a number above 0. Default 0.5.
----@field margin? number Gap below which a sample becomes a contact point. A sample that will reach the surface within 1.5 steps becomes one as well. Expects a number above 0 (m). Default 0.0002.
----@field sleep_speed? number Speed below which a body may fall asleep. Expects a number of 0 or more (m/s). Default 0.0001.
----@field sleep_delay? number Time for which a body must be that slow before it sleeps. Expects a number above 0 (s). Default 0.5.
+---@field dissipation_time? number Dissipation time scale τ_d of contact springs, s (Castro et al. 2022). A surface that recedes faster than the springs relax is released; the value is small compared with `dt`, so that friction does not lift a sliding surface. Expects a number in 0..1 (s). Default 0.005.
+---@field rigid_modulus? number Normal contact stiffness per area of nearly rigid colliders, Pa/m: near rigid for Young's moduli up to 1 MPa. Expects a number in above 0..1000000000000 (Pa/m). Default 1e9.
+---@field shear_ratio? number Tangential over normal contact stiffness. Mindlin (1949) gives 0.5 to 0.8 for solids; creep does not depend on it. Expects a number in above 0..10. Default 0.5.
+---@field margin? number Gap below which a sample becomes a contact point. A sample that will reach the surface within 1.5 steps becomes one as well. Expects a number in above 0..0.01 (m). Default 0.0002.
+---@field sleep_speed? number Speed below which a body may fall asleep. Expects a number in 0..1 (m/s). Default 0.0001.
+---@field sleep_delay? number Time for which a body must be that slow before it sleeps. Expects a number in above 0..60 (s). Default 0.5.
 ---@field sleeping? boolean True if bodies may fall asleep at all. Expects true or false. Default true.
----@field max_inverted_time? number Longest time for which an element may be inverted before the run is invalid. Expects a number of 0 or more (s). Default 0.1.
----@field max_speed? number Largest speed of a valid state, m/s: far above that of a gripper (0.2 m/s), an arm, or a fall onto a table. Expects a number above 0 (m/s). Default 100.
+---@field max_inverted_time? number Longest time for which an element may be inverted before the run is invalid. Expects a number in 0..60 (s). Default 0.1.
+---@field max_speed? number Largest speed of a valid state, m/s: far above that of a gripper (0.2 m/s), an arm, or a fall onto a table. Expects a number in above 0..1000 (m/s). Default 100.
 
 ---Settings; those that are left out keep their values. docs/settings.md lists all.
 ---@class softvt.Settings.robot
@@ -705,27 +705,27 @@
 
 ---Settings; those that are left out keep their values. docs/settings.md lists all.
 ---@class softvt.Settings.robot.arm
----@field kp? number Stiffness. Expects a number above 0 (N m/rad). Default 8000.
----@field kd? number Damping. Expects a number above 0 (N m s/rad). Default 800.
+---@field kp? number Stiffness. Expects a number in above 0..1000000 (N m/rad). Default 8000.
+---@field kd? number Damping. Expects a number in above 0..100000 (N m s/rad). Default 800.
 
 ---Settings; those that are left out keep their values. docs/settings.md lists all.
 ---@class softvt.Settings.robot.gripper
----@field kp? number Stiffness. Expects a number above 0 (N/m). Default 2000.
----@field kd? number Damping. Expects a number above 0 (N s/m). Default 100.
+---@field kp? number Stiffness. Expects a number in above 0..1000000 (N/m). Default 2000.
+---@field kd? number Damping. Expects a number in above 0..100000 (N s/m). Default 100.
 ---@field effort? number Largest force per finger. The real hand holds 70 N continuously (Franka Emika, Hand data sheet); the paper's simulator has 200 N. Expects a number in above 0..500 (N). Default 70.
 ---@field speed? number Speed at which the target of each finger moves. Expects a number in above 0..2 (m/s). Default 0.2.
----@field finger_mass? number Mass of each finger with its sensor. Expects a number above 0 (kg). Default 0.1.
+---@field finger_mass? number Mass of each finger with its sensor. Expects a number in above 0..10 (kg). Default 0.1.
 
 ---Settings; those that are left out keep their values. docs/settings.md lists all.
 ---@class softvt.Settings.robot.pads
----@field normal_modulus? number Normal stress per indentation. Expects a number above 0 (Pa/m). Default 300000000.
----@field tangential_modulus? number Shear stress per tangential displacement. Expects a number above 0 (Pa/m). Default 40000000.
----@field static_mu? number Friction coefficient while the pad sticks. Expects a number of 0 or more. Default 1.5.
----@field dynamic_mu? number Dynamic friction coefficient, not above the static one. Expects a number of 0 or more. Default 1.2.
+---@field normal_modulus? number Normal stress per indentation. Expects a number in above 0..1000000000000 (Pa/m). Default 300000000.
+---@field tangential_modulus? number Shear stress per tangential displacement. Expects a number in above 0..1000000000000 (Pa/m). Default 40000000.
+---@field static_mu? number Friction coefficient while the pad sticks. Expects a number in 0..100. Default 1.5.
+---@field dynamic_mu? number Dynamic friction coefficient, not above the static one. Expects a number in 0..100. Default 1.2.
 
 ---Settings; those that are left out keep their values. docs/settings.md lists all.
 ---@class softvt.Settings.robot.ik
----@field lambda? number Damping λ of the least squares, in the mixed unit (m and rad per rad) of the Jacobian's singular values. Larger values are slower and more robust near singularities. Expects a number above 0. Default 0.01.
+---@field lambda? number Damping λ of the least squares, in the mixed unit (m and rad per rad) of the Jacobian's singular values. Larger values are slower and more robust near singularities. Expects a number in above 0..10. Default 0.01.
 ---@field posture_gain? number Share of the way to the rest posture that the null space covers per control step, 0..=1. Expects a number in 0..1. Default 0.
 
 ---Settings; those that are left out keep their values. docs/settings.md lists all.
@@ -738,19 +738,19 @@
 ---@class softvt.Settings.robot.disturbance
 ---@field position? number Standard deviation of the position along each axis. Expects a number in 0..0.05 (m). Default 0.
 ---@field rotation? number Standard deviation of the rotation about each axis. Expects a number in 0..0.5 (rad). Default 0.
----@field duration? number Time after which the correlation of the offset has fallen to 1/e. Expects a number above 0 (s). Default 0.5.
+---@field duration? number Time after which the correlation of the offset has fallen to 1/e. Expects a number in above 0..1000 (s). Default 0.5.
 
 ---Settings; those that are left out keep their values. docs/settings.md lists all.
 ---@class softvt.Settings.criteria
----@field touch_force_n? number Minimum force that counts as contact, of a pad, another part of the robot or a support. Expects a number of 0 or more (N). Default 0.001.
+---@field touch_force_n? number Minimum force that counts as contact, of a pad, another part of the robot or a support. Expects a number in 0..100 (N). Default 0.001.
 ---@field lift_height_m? number Minimum rise of a body's lowest point above its settled height that counts as lifted. Expects a number in 0..0.5 (m). Default 0.005.
----@field lost_contact_s? number Time without pad contact after which a grasp may count as lost, s (0.15 s: three control steps). Expects a number of 0 or more (s). Default 0.15.
+---@field lost_contact_s? number Time without pad contact after which a grasp may count as lost, s (0.15 s: three control steps). Expects a number in 0..60 (s). Default 0.15.
 ---@field lost_fall_m? number Fall relative to the hand beyond which a lost grasp is a drop. Expects a number in 0..0.5 (m). Default 0.02.
 ---@field free_fall_m? number Length of a free fall beyond which it is a drop, before or after the release. Expects a number in 0..0.5 (m). Default 0.05.
 ---@field release_margin_m? number Excess of the commanded over the measured gripper width that counts as a release command. Expects a number in 0..0.5 (m). Default 0.005.
 ---@field slip_m? number Largest allowed distance that the object slides along a pad while the pads alone carry it, m: NoSlip, which is not part of NoDrop. Expects a number in 0..0.5 (m). Default 0.002.
 ---@field require_no_slip? boolean True if Safety Success needs NoSlip. Expects true or false. Default false.
----@field gentle_ratio? number Largest grip ratio of a gentle grip. Expects a number of 0 or more. Default 2.
+---@field gentle_ratio? number Largest grip ratio of a gentle grip. Expects a number in 0..1000. Default 2.
 ---@field support_share? number Minimum share of the target's weight that the goal must carry, 0 to 1. Expects a number in 0..1. Default 0.5.
 ---@field leave_margin_m? number Distance of the centre beyond the goal's edge at which a placed object has left the goal. Expects a number in 0..0.5 (m). Default 0.005.
 ---@field goal_v1_on_m? number Horizontal and vertical distance within which SoftVTBench's released code counts an object as "on". Expects a number in 0..2 (m). Default 0.1.

@@ -237,7 +237,7 @@ mod tests {
         for words in [
             "x.lua",
             "check x.lua",
-            "view x.lua",
+            "view x.lua --out made",
             "watch x.lua",
             "record x.lua --out made",
             "serve x.lua",

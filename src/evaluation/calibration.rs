@@ -282,7 +282,7 @@ impl Envelope {
 
     /// The envelope that follows from the rows of this one, of which those that are not [intact](SweepRow::instability)
     /// are not stable.
-    pub(crate) fn recomputed(&self, kappa: f64) -> Self {
+    pub fn recomputed(&self, kappa: f64) -> Self {
         let Self { protocol, stable_strain, censored, holds, sweep, variants, .. } = self.clone();
         let is_stable = |row: &SweepRow| row.stable && row.instability().is_none();
         let sweep = sweep.into_iter().map(|row| SweepRow { stable: is_stable(&row), ..row }).collect();

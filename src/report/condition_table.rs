@@ -204,9 +204,9 @@ fn controllers_of_suites(suites: &[ConditionTable]) -> String {
     }
     table.rule();
     if suites.iter().flat_map(|suite| &suite.rows).any(|row| row.blind) {
-        table.line("* one constant number, by what shows of an object and the statistics of the suite");
+        table.line("* one constant number, by what shows of an object and the statistics of suites");
         for suite in suites {
-            table.line(format!("best constant number, {}: {}", suite.suite, best_blind(suite)));
+            table.line(format!("best of *, {}: {}", suite.suite, best_blind(suite)));
         }
     }
     table.text
@@ -341,10 +341,7 @@ mod tests {
         assert_eq!(lines("expert").len(), 2, "five suites take two tables: {text}");
         let words: Vec<&str> = lines("middle *")[1].split_whitespace().collect();
         assert_eq!(words, ["middle", "*", "100.0", "/", "50.0", "100.0", "/", "50.0"]);
-        assert_eq!(
-            lines("best constant number, rolls"),
-            ["best constant number, rolls: middle, Safety 50.0 % [9.5, 90.5]"]
-        );
+        assert_eq!(lines("best of *, rolls"), ["best of *, rolls: middle, Safety 50.0 % [9.5, 90.5]"]);
         assert!(lines("reference").is_empty(), "{text}");
     }
 }

@@ -61,9 +61,11 @@ impl<'a> SuiteChecker<'a> {
         let jobs = EpisodeList::of_tasks(&tasks, episodes, None);
         let mut found = check_scenes(&run, &jobs)?;
         found.warnings.extend(changing_defaults(&run, &jobs)?);
-        found.warnings.extend(self.settle(&run, &jobs, std::mem::take(&mut found.scenes))?);
+        let settled = self.settle(&run, &jobs, std::mem::take(&mut found.scenes));
         self.config.observer.end();
+        // First, since they may say why an object does not come to rest.
         found.warnings.into_iter().for_each(&mut warn);
+        settled?.into_iter().for_each(&mut warn);
         let run = SuiteRun { jobs: select_episodes(self.config, suite, &tasks), ..run };
         let judged = run.scan_limits()?.judged;
         for asset in found.without_strain.intersection(&judged) {

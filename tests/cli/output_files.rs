@@ -44,7 +44,7 @@ fn lists_are_printed_as_text_and_as_json() {
     assert!(json("assets").iter().filter(|a| a["name"] == "plate" || a["name"] == "sesame_bun").count() == 2);
     let names = |what: &str| json(what).iter().map(|row| row["name"].clone()).collect::<Vec<_>>();
     assert_eq!(
-        names("policies")[..12],
+        names("policies")[..13],
         [
             "expert",
             "expert-binary",
@@ -56,6 +56,7 @@ fn lists_are_printed_as_text_and_as_json() {
             "one-force-for-all",
             "drives",
             "look-retry",
+            "weigh",
             "noop",
             "random"
         ]

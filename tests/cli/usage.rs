@@ -25,7 +25,7 @@ fn with_options(words: &str) -> String {
 #[test]
 fn unknown_policies_get_a_suggestion() {
     assert_snapshot!(small("--policy noob"), @r"
-    x.lua: invalid value 'noob' for '--policy <POLICY>': expected expert, expert-binary, tactile-servo, fixed-closure, size-seen, contact-depth, one-force, one-force-for-all, drives, look-retry, noop, random, a Lua file such as my_policy.lua, a server such as ws://host:8000, or a run folder; did you mean noop?
+    x.lua: invalid value 'noob' for '--policy <POLICY>': expected expert, expert-binary, tactile-servo, fixed-closure, size-seen, contact-depth, one-force, one-force-for-all, drives, look-retry, weigh, noop, random, a Lua file such as my_policy.lua, a server such as ws://host:8000, or a run folder; did you mean noop?
 
     For more information, try '--help'.
     ");

@@ -8,7 +8,10 @@ local at = softvt.pose { position = { 0, 0, 0.2 } }
 local motions = {
   sideways = function(pose) return pose:translated { 0.00025, 0, 0 } end,
   along = function(pose) return pose:translated { 0, 0, 0.00025 } end,
-  twist = function(pose) return pose:rotated(0.02) end,
+  -- About the axis along which the fingers close.
+  twist = function(pose)
+    return softvt.pose { position = pose.position, quaternion = { 0, math.cos(0.01), 0, -math.sin(0.01) } }
+  end,
 }
 local ground = softvt.shape.box { size = { 1, 1, 0.05 } }
 local floor = softvt.asset { name = "floor", shape = ground:translate(0, 0, -0.025), body = softvt.static {} }
@@ -42,8 +45,8 @@ local function share(shape, motion)
   local sim = softvt.simulate { layout = layout }
   local function state()
     local position, axis = sim:tool()
-    -- The hand points down: its axis of rotation is horizontal.
-    return { position = position, yaw = 2 * math.atan(axis[2], axis[1]), px = sim:tactile("left").present }
+    -- The hand points down: it is turned by half a turn about an axis near x.
+    return { position = position, tilt = 2 * math.atan(axis[3], axis[1]), px = sim:tactile("left").present }
   end
   assert(sim:drive(function(arm)
     arm:move_to(at:translated { 0, 0, 0.08 })
@@ -57,7 +60,10 @@ local function share(shape, motion)
     arm:wait(1)
   end))
   local after = state()
-  if motion == "twist" then return math.abs((direction(after.px) - direction(before.px)) / (after.yaw - before.yaw)) end
+  if motion == "twist" then
+    local turned = (after.tilt - before.tilt + math.pi) % (2 * math.pi) - math.pi
+    return math.abs((direction(after.px) - direction(before.px)) / turned)
+  end
   local markers_mm = MM_PER_PX * distance(before.px[MIDDLE], after.px[MIDDLE])
   return markers_mm / (1e3 * distance(before.position, after.position))
 end

@@ -325,11 +325,18 @@ impl Run<'_> {
 
     /// Checks the script without running it, as `softvt check` does. Returns the warnings.
     pub fn check(self) -> Result<Vec<String>, String> {
-        let checked = || -> Result<Vec<String>, RunError> {
+        let (warnings, checked) = self.check_to_end();
+        checked.map(|()| warnings)
+    }
+
+    /// As [`Self::check`], with the warnings of a script that is refused as well.
+    pub fn check_to_end(self) -> (Vec<String>, Result<(), String>) {
+        let mut warnings = Vec::new();
+        let mut checked = || -> Result<(), RunError> {
             let run = self.load()?;
             let ConfiguredScript { config, script } = &run;
             check_distinct_out_dirs(config, script.plan.suites())?;
-            let (checker, mut warnings) = (SuiteChecker::new(&run), Vec::new());
+            let checker = SuiteChecker::new(&run);
             for suite in script.plan.suites() {
                 checker.check(suite, config.episodes.unwrap_or(1), |warning| warnings.push(warning))?;
             }
@@ -343,9 +350,10 @@ impl Run<'_> {
                 }
                 Plan::Suite(_) | Plan::Suites { .. } => {}
             }
-            Ok(warnings)
+            Ok(())
         };
-        checked().map_err(|error| self.project.relative(error))
+        let checked = checked().map_err(|error| self.project.relative(error));
+        (warnings, checked)
     }
 
     /// Runs the conditions of the script into the output folder.

@@ -9,7 +9,7 @@ const CONE: &str = "softvt.shape.lathe { corners = { { 0, 0 }, { 0.017, 0 }, { 0
 const BERRY: &str = "softvt.shape.lathe { corners = { { 0, 0 }, { 0.002, 0 }, { 0.014, 0.02 }, { 0.012, 0.03 }, \
                      { 0, 0.034 } } }:round(0.001):grounded()";
 /// An egg on its thin end.
-const EGG: &str = "softvt.shape.ellipsoid { radii = { 0.018, 0.018, 0.026 } }:rotate { axis = 'x', angle = 0.3 }\
+const EGG: &str = "softvt.shape.ellipsoid { size = { 0.036, 0.036, 0.052 } }:rotate { axis = 'x', angle = 0.3 }\
                    :grounded()";
 
 /// A task that puts an object of this shape on a plate, with the standard expert.
@@ -60,9 +60,9 @@ fn the_check_tells_objects_that_tilt_fall_over_or_do_not_come_to_rest() {
     assert!(said(BERRY).contains("object cube: it falls over by "), "{}", said(BERRY));
     let upright = said(Small::default().shape);
     assert!(!upright.contains("settles"), "{upright}");
-    let rolling = "local ramp = softvt.asset { name = 'ramp', shape = softvt.shape.box { size = { 3, 1, 0.05 } }\
+    let rolling = "local ramp = softvt.asset { name = 'ramp', shape = softvt.shape.box { size = { 8, 1, 0.05 } }\
                    :rotate { axis = 'y', angle = 0.1 }, body = softvt.static {} }\n\
-                   scene:add { name = 'ramp', asset = ramp, position = { 0, 1.2, 0.3 } }\n\
+                   scene:add { name = 'ramp', asset = ramp, position = { 0, 1.2, 0.6 } }\n\
                    scene:add { name = 'ball', asset = softvt.asset { name = 'ball', body = softvt.rigid { density = 500 },\n\
                    shape = softvt.shape.sphere { radius = 0.01 }:grounded() }, at = { 0, 1.2 }, on = 'ramp' }\nend)";
     let text = Small::default().text().replacen("end)", rolling, 1);

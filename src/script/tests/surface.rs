@@ -111,6 +111,7 @@ fn wrong_calls_get_messages_in_terms_of_the_lua_interface() {
             "softvt.Deformation",
             "softvt.Measurements",
             "softvt.TactileReading",
+            "softvt.Lying",
             "softvt.WindowEnd",
             "softvt.SafeWindow",
             "softvt.Envelope",

@@ -4,6 +4,7 @@ use super::*;
 use crate::{EpisodeSetup, SceneChanges, load_variation};
 use softvt_benchmark::Plan;
 use softvt_common::episode_id::{EpisodeId, EpisodeSplit};
+use softvt_evaluation::thresholds::ThresholdFile;
 use softvt_scene::{HiddenProperties, Object};
 
 const ASSETS: &str = r#"
@@ -369,10 +370,11 @@ fn instances_without_a_safe_grip_by_the_calibration_are_drawn() {
     let project = project(&format!("{HIDDEN} return suite(placed(sphere), softvt.variation(ranges))"));
     let path = "assets/calibration/sphere.json";
     let text = std::str::from_utf8(crate::embedded(path).expect("shipped")).expect("UTF-8");
-    let mut none: serde_json::Value = serde_json::from_str(text).expect("JSON");
-    none["envelopes"]["sphere"]["holds"] = serde_json::json!([]);
-    none["envelopes"]["sphere"]["window"]["width_lower_mm"] = serde_json::Value::Null;
-    project.write(path, none.to_string().as_bytes());
+    let mut file = ThresholdFile::parse(text, path).expect("a calibration");
+    let (mut none, kappa) = (file.envelopes["sphere"].clone(), file.calibration.kappa);
+    none.holds.clear();
+    file.insert("sphere", none.recomputed(kappa));
+    project.write(path, file.to_text().as_bytes());
     let loaded = project.load("x.lua", &[]).expect("a suite");
     let drawn = hidden_of(open(&loaded, 0, 0).expect("an episode"));
     assert!(drawn.iter().all(|hidden| hidden.window_ratio == 1.0), "{drawn:?}");
