@@ -572,7 +572,7 @@ impl<'a> SuiteRun<'a> {
         check().map_err(|error| self.episode_error(&error))
     }
 
-    /// Lets a scene settle. Returns warnings about objects that tilt by more than [`MAX_TILT_DEG`].
+    /// Lets a scene settle. Returns warnings about objects that tilt.
     ///
     /// # Errors
     /// The scene does not come to rest.
