@@ -1,6 +1,6 @@
--- Bounds of what controllers without touch can do in a suite, by arithmetic: the share of the instances that the suite
--- draws whose safe window contains the number that a controller keeps constant (experts.blind_grips). Nothing is
--- simulated.
+-- Bounds of controllers that keep one number constant, by arithmetic: the share of the instances that a suite draws
+-- whose safe window contains that number (experts.blind_grips). They do not bound controllers that find the grip by
+-- trial. Nothing is simulated.
 --
 --   softvt scripts/blind_bounds.lua --suite object_hidden
 --   softvt scripts/blind_bounds.lua --suite object_soft,object_varied --instances 500

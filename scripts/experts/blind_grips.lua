@@ -1,10 +1,10 @@
 -- Grips of controllers that do not feel the instance in the hand. They know what shows of an object (its kind, size and
 -- pose) and the statistics of the suite. Each keeps one number constant for all instances of a kind, scaled by a power
 -- of the size: the number that is inside of the safe windows of the largest share of the instances that the suite
--- draws. A policy without touch can do that much.
+-- draws.
 --
--- look-retry and weigh are no such bounds: they lift, look whether the object follows or weigh what hangs on the arm,
--- and close further.
+-- look-retry and weigh keep no number constant: they lift, look whether the object follows or weigh what hangs on the
+-- arm, and close further.
 local grasp = require "experts.grasp"
 local hand = require "experts.hand"
 local trial_constants = require "experts.trial_constants"

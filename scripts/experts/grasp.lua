@@ -17,7 +17,7 @@ local COMMAND_MARGIN = 0.002
 -- Squeeze of a rigid object: the target width is below its width by this much, m.
 local SQUEEZE = 0.012
 
--- Maps a yaw to (-90°, 90°]: a two-fingered hand closes along the same line after half a turn.
+-- Maps a yaw to [-90°, 90°]: a two-fingered hand closes along the same line after half a turn.
 local function wrap_half_turn(yaw)
   while yaw > math.pi / 2 do
     yaw = yaw - math.pi

@@ -5,7 +5,7 @@
 -- The grip is drawn uniformly from a part of the safe window (`window`, 0.8 of it, around `share`, its middle), so that
 -- demonstrations do not tell one width per object. The hand closes slowly from before first contact (`closing_speed`,
 -- 0.008 m/s). `stop = "touch"` ends closing by the force on the pads instead of the width of the gels, as does a grasp
--- that is turned or off-centre for want of clearance. `closure` commands one closure instead. `to` places the object
+-- that is turned or off-centre because of clearance. `closure` commands one closure instead. `to` places the object
 -- beside the target, on the same support: "near", or as seen from the robot "left_of", "right_of", "in_front_of" or
 -- "behind", with `distance` (m) between the centres.
 --

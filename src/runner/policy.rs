@@ -188,22 +188,22 @@ impl BuiltinPolicy {
             }
             Self::Controlled(controller) => match controller {
                 BlindGrip::FixedClosure => {
-                    "the same expert without touch: one closure per kind of object (privileged)"
+                    "the same expert with one constant number: one closure per kind of object (privileged)"
                 }
                 BlindGrip::SizeSeen => {
-                    "the same expert without touch: the best closure for the size of the object (privileged)"
+                    "the same expert with one constant number: the best closure for the size of the object (privileged)"
                 }
                 BlindGrip::ContactDepth => {
-                    "the same expert without touch: the best indentation after first contact (privileged)"
+                    "the same expert with one constant number: the best indentation after first contact (privileged)"
                 }
                 BlindGrip::OneForce => {
-                    "the same expert without touch: the best force per kind of object (privileged)"
+                    "the same expert with one constant number: the best force per kind of object (privileged)"
                 }
                 BlindGrip::OneForceForAll => {
-                    "the same expert without touch: the best force for all objects of the suite (privileged)"
+                    "the same expert with one constant number: the best force for all objects of the suite (privileged)"
                 }
                 BlindGrip::Drives => {
-                    "the same expert without touch: reads the width and the force of the finger drives (privileged)"
+                    "the same expert with one constant number: reads the width and the force of the finger drives (privileged)"
                 }
                 BlindGrip::LookRetry => {
                     "the same expert without touch: lifts, looks whether the object follows, and closes further (privileged)"
