@@ -116,9 +116,9 @@ pub enum VariationError {
 /// Presses of an asset from which its instances are drawn.
 #[derive(Clone)]
 pub struct DrawPresses {
-    /// Those of its draw reference, by which instances are kept.
+    /// Presses of its draw reference, by which instances are kept.
     pub reference: Arc<InstancePresses>,
-    /// Those of its calibration, by which the windows of instances are stated.
+    /// Presses of its calibration, by which the windows of instances are stated.
     pub calibrated: Arc<InstancePresses>,
 }
 

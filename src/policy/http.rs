@@ -178,7 +178,7 @@ impl<'a> HttpRequest<'a> {
         }
         let length = headers.get(header::CONTENT_LENGTH).map_or(Some("0"), |length| length.to_str().ok());
         let Some(length) = length.and_then(|length| length.parse::<u64>().ok()) else {
-            return Err(Refusal::new(StatusCode::BAD_REQUEST, "the Content-Length is no number\n"));
+            return Err(Refusal::new(StatusCode::BAD_REQUEST, "the Content-Length is not a number\n"));
         };
         let length = usize::try_from(length).ok().filter(|length| *length <= MAX_BODY_BYTES);
         let Some(length) = length else {

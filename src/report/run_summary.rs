@@ -73,7 +73,7 @@ fn summarize(run: StoredRun) -> RunSummary {
     RunSummary { run, summary, method }
 }
 
-/// What a reader of the results of these runs has to know, one sentence each.
+/// Caveats of the results of these runs, one sentence each.
 pub fn warnings(runs: &[RunSummary]) -> Vec<String> {
     let of_run = |run: &RunSummary| {
         let dir = run.run.dir.display();

@@ -131,7 +131,7 @@ impl StoredRun {
         self.manifest["privileged"] == true || PRIVILEGED_POLICIES.contains(&self.text("policy"))
     }
 
-    /// What the policy knew beyond what a robot measures, and whose actions it repeated.
+    /// Marks of the policy: knowledge beyond what a robot measures, and repeated actions.
     pub fn marks(&self) -> MethodMarks {
         MethodMarks {
             privileged: self.is_privileged(),

@@ -1,4 +1,4 @@
-//! How an object lies that does not rest as its asset is modelled.
+//! Box about an object that does not rest as its asset is modelled.
 
 use softvt_geometry::{Aabb, Pose, Quat, Vec3, shape::Shape, surface_mesh::SurfaceMesh, voxel::Embedding};
 use softvt_physics::fem::FemState;

@@ -62,7 +62,7 @@ pub struct ObjectInstance {
     pub model: Option<Arc<FemModel>>,
     /// Bounds of the shape at rest, object frame. For a part: that of the whole object with all joints at 0.
     pub bounds: Aabb,
-    /// How it lies, if it has settled otherwise than its asset is modelled.
+    /// Box about it, if it has tilted while it settled.
     pub settled: Option<SettledBox>,
     /// The part, if this is not a whole object.
     pub part: Option<ArticulatedPart>,
@@ -213,7 +213,7 @@ impl Simulation {
         Ok(())
     }
 
-    /// How an object lies that does not rest as modelled.
+    /// Box about an object that does not rest as modelled.
     fn settled_box(&self, object: &ObjectInstance) -> Option<SettledBox> {
         let soft = match object.body {
             BodyId::Soft(id) => Some(&self.world.soft(id).state),

@@ -128,7 +128,7 @@ impl TargetMonitors {
         touch
     }
 
-    /// What was found, if the episode ends here. `missing` is the drop of an episode that did not end validly.
+    /// Findings if the episode ends here. `missing` is the drop of an episode that did not end validly.
     pub(super) fn finish(
         &self,
         config: &JudgeConfig,

@@ -464,7 +464,7 @@ impl SuiteSummary {
         method_label(&self.policy, self.marks())
     }
 
-    /// What to say about how the episodes came about: repeated attempts, and goals without contact of the robot.
+    /// Sentences on repeated attempts, and on goals that were reached without contact of the robot.
     pub fn attempt_notes(&self) -> Vec<String> {
         let mut notes = Vec::new();
         let (repeated, untouched) = (&self.repeated_episodes, &self.goals_untouched);
@@ -485,7 +485,7 @@ impl SuiteSummary {
         notes
     }
 
-    /// What the method knew beyond what a robot measures, and whose actions it repeated.
+    /// Marks of the method: knowledge beyond what a robot measures, and repeated actions.
     pub fn marks(&self) -> MethodMarks {
         let Self { privileged, replayed, force_observed, .. } = *self;
         MethodMarks { privileged, replayed, force_observed }
