@@ -90,11 +90,6 @@ impl BodyId {
             _ => None,
         }
     }
-
-    /// True for the links of `articulation`.
-    pub fn is_link_of(self, articulation: ArticulationId) -> bool {
-        matches!(self, Self::Link(link) if link.articulation == articulation)
-    }
 }
 
 impl From<LinkId> for BodyId {
