@@ -7,6 +7,11 @@ use serde::{Deserialize, Serialize};
 
 use super::{Vec3, union_find::UnionFind};
 
+/// Bits of a position, equal for equal positions.
+fn position_key(v: &Vec3) -> [u64; 3] {
+    [v.x, v.y, v.z].map(|x| (x + 0.0).to_bits())
+}
+
 /// A triangle mesh with vertices and triangles by index.
 #[derive(Clone, Debug, PartialEq, Default, Serialize, Deserialize)]
 pub struct Mesh {
@@ -76,8 +81,13 @@ impl Mesh {
 
     /// Moves vertices that are at most `distance` (m) apart, also by way of others, to the first of them.
     pub(crate) fn snapped(&self, distance: f64) -> Self {
-        let points = self.vertices.iter().enumerate();
-        let points = points.map(|(index, v)| GeomWithData::new([v.x, v.y, v.z], index));
+        let mut first = BTreeMap::new();
+        let of_position = |(index, v): (usize, &Vec3)| *first.entry(position_key(v)).or_insert(index);
+        let firsts: Vec<usize> = self.vertices.iter().enumerate().map(of_position).collect();
+        let points = first.into_values().map(|index| {
+            let v = self.vertices[index];
+            GeomWithData::new([v.x, v.y, v.z], index)
+        });
         let tree = RTree::bulk_load(points.collect());
         let mut sets = UnionFind::new(self.vertices.len());
         for point in &tree {
@@ -85,7 +95,7 @@ impl Mesh {
                 sets.union(point.data, near.data);
             }
         }
-        let vertices = (0..self.vertices.len()).map(|index| self.vertices[sets.find(index)]).collect();
+        let vertices = firsts.into_iter().map(|index| self.vertices[sets.find(index)]).collect();
         Self { vertices, ..self.clone() }
     }
 
@@ -99,12 +109,11 @@ impl Mesh {
         let mut kept = Vec::with_capacity(self.triangles.len());
         let mut index = BTreeMap::new();
         let mut out = Self::default();
-        let key = |v: &Vec3| [v.x, v.y, v.z].map(|x| (x + 0.0).to_bits());
         let renamed: Vec<u32> = self
             .vertices
             .iter()
             .map(|v| {
-                *index.entry(key(v)).or_insert_with(|| {
+                *index.entry(position_key(v)).or_insert_with(|| {
                     out.vertices.push(*v);
                     out.vertices.len() as u32 - 1
                 })

@@ -21,7 +21,7 @@ pub enum RecordError {
     Contradiction(String),
 }
 
-/// True for a field of the header, the verdict or the counters of records.
+/// True for a field of the header, the outcome, the verdict or the counters of records.
 pub fn is_record_key(name: &str) -> bool {
     /// True if a field of a `T` reads the key: none takes lists of empty lists.
     fn is_read<T: Default + Serialize + DeserializeOwned>(name: &str) -> bool {
@@ -29,8 +29,11 @@ pub fn is_record_key(name: &str) -> bool {
         part[name] = json!([[[]]]);
         serde_json::from_value::<T>(part).is_err()
     }
-    const HEADER: [&str; 8] =
-        ["suite", "task", "episode", "policy", "privileged", "replayed", "variation", "origin"];
+    #[rustfmt::skip]
+    const HEADER: [&str; 16] = [
+        "suite", "task", "prompt", "task_prompt", "layout", "episode", "seed", "split", "policy", "privileged",
+        "replayed", "asset", "soft", "variation", "origin", "outcome",
+    ];
     HEADER.contains(&name) || is_read::<Verdict>(name) || is_read::<RolloutStats>(name)
 }
 

@@ -63,7 +63,10 @@ impl Attempts {
         let line = files::json_lines(&self.path, [index])?;
         let file = match begun.file.take() {
             Some(file) => file,
-            None => Journal::resume(&self.path).map_err(of_folder(&self.path, ATTEMPTS))?.0,
+            None => {
+                let folder = self.path.parent().unwrap_or(&self.path);
+                Journal::resume(&self.path).map_err(of_folder(folder, ATTEMPTS))?.0
+            }
         };
         Ok(begun.file.insert(file).append(&line)?)
     }

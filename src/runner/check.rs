@@ -43,7 +43,8 @@ impl<'a> SuiteChecker<'a> {
     }
 
     /// Builds and checks the scenes of the first episodes of every task on all processors, lets the objects settle,
-    /// each asset once, gives their warnings to `warn`, and reads the limits of their objects. Nothing is rendered.
+    /// each asset once and by its approximate model, gives their warnings to `warn`, and reads the limits of their
+    /// objects. Nothing is rendered.
     ///
     /// # Errors
     /// A setting, a scene, a sensor or a calibration file that is not valid; an object that does not come to rest; a
@@ -107,21 +108,26 @@ impl SuiteChecker<'_> {
     fn with_new_objects(mut scene: Scene, settled: &mut BTreeSet<String>) -> Option<Scene> {
         let is_movable = |object: &Object| matches!(object.asset.body, Body::Rigid { .. } | Body::Soft(_));
         let box_w = |object: &Object| object.asset.shape.loose_bounds().transformed(&object.pose_w);
-        let mut kept: Vec<Aabb> = Vec::new();
-        for object in scene.objects.iter().filter(|object| is_movable(object)) {
-            if settled.insert(object.nominal.fingerprint()) {
-                kept.push(box_w(object));
-            }
-        }
-        if kept.is_empty() {
+        let overlaps = |a: &Aabb, b: &Aabb| (0..2).all(|i| a.min[i] <= b.max[i] && b.min[i] <= a.max[i]);
+        let movable = || scene.objects.iter().filter(|object| is_movable(object));
+        let boxes: Vec<Aabb> = movable().map(box_w).collect();
+        let mut kept: Vec<bool> =
+            movable().map(|object| settled.insert(object.nominal.fingerprint())).collect();
+        if !kept.contains(&true) {
             return None;
         }
-        let is_kept = |own: &Aabb| {
-            let overlaps =
-                |other: &Aabb| (0..2).all(|i| own.min[i] < other.max[i] && other.min[i] < own.max[i]);
-            kept.iter().any(overlaps)
-        };
-        scene.objects.retain(|object| !is_movable(object) || is_kept(&box_w(object)));
+        // What may support a kept object is kept, and what may support that.
+        loop {
+            let supports =
+                |own: &Aabb| boxes.iter().zip(&kept).any(|(other, kept)| *kept && overlaps(own, other));
+            let next: Vec<bool> = boxes.iter().map(supports).collect();
+            if next == kept {
+                break;
+            }
+            kept = next;
+        }
+        let mut kept = kept.into_iter();
+        scene.objects.retain(|object| !is_movable(object) || kept.next() == Some(true));
         Some(scene)
     }
 }

@@ -291,6 +291,7 @@ fn compare_conditions(
             reference.get_or_insert(result.records);
             marks.force_observed |= result.summary.force_observed;
             marks.replayed |= result.summary.replayed;
+            marks.privileged |= result.summary.privileged;
         }
         rows.push(ConditionRow {
             condition: case.condition.name.clone(),

@@ -199,7 +199,8 @@ pub(crate) fn write_or_compare(dir: &Path, manifest: &impl Serialize) -> Result<
     let mut stored: Value = serde_json::from_str(&stored)
         .map_err(|error| RunError::input(format!("{path} is not a valid run file: {error}")))?;
     stored_run::remove_folder(&mut stored);
-    match difference(&stored, &comparable(manifest, &stored)) {
+    let now = comparable(manifest, &mut stored);
+    match difference(&stored, &now) {
         None => Ok(()),
         Some(what) => Err(RunError::input(format!(
             "{path} belongs to another run: {what}; resume it with its original arguments, or select another output folder"
@@ -215,15 +216,20 @@ pub(crate) fn is_in(dir: &Path, manifest: &RunManifest) -> Result<bool, RunError
     let text = files::read_text(&dir.join(RUN))?;
     Ok(serde_json::from_str::<Value>(&text).is_ok_and(|mut stored| {
         stored_run::remove_folder(&mut stored);
-        stored == comparable(manifest, &stored)
+        let now = comparable(manifest, &mut stored);
+        stored == now
     }))
 }
 
-/// A manifest without the fields that earlier versions did not write, if the stored one lacks them.
-fn comparable(manifest: &impl Serialize, stored: &Value) -> Value {
+/// A manifest without `blind`, if the stored one lacks it, as earlier versions did. Removes from both `modified`, which
+/// follows from the sources and the binary.
+fn comparable(manifest: &impl Serialize, stored: &mut Value) -> Value {
     let mut manifest = json!(manifest);
-    if let Some(fields) = manifest.as_object_mut() {
-        fields.retain(|name, _| !["blind", "modified"].contains(&name.as_str()) || !stored[name].is_null());
+    for value in [&mut manifest, &mut *stored] {
+        value.as_object_mut().and_then(|fields| fields.shift_remove("modified"));
+    }
+    if let Some(fields) = manifest.as_object_mut().filter(|_| stored["blind"].is_null()) {
+        fields.shift_remove("blind");
     }
     manifest
 }
@@ -304,13 +310,13 @@ mod tests {
     }
 
     #[test]
-    fn a_run_of_an_earlier_version_may_lack_what_it_did_not_write() {
+    fn a_run_of_an_earlier_version_or_another_binary_may_lack_what_it_did_not_write() {
         let now = json!({ "policy": "drives", "blind": true, "seed": 0, "modified": ["scripts/shifts.lua"] });
-        assert_eq!(
-            comparable(&now, &json!({ "policy": "drives", "seed": 0 })),
-            json!({ "policy": "drives", "seed": 0 })
-        );
-        assert_eq!(comparable(&now, &now), now);
+        let earlier = json!({ "policy": "drives", "seed": 0 });
+        assert_eq!(comparable(&now, &mut earlier.clone()), earlier);
+        let (same, mut stored) = (json!({ "policy": "drives", "blind": true, "seed": 0 }), now.clone());
+        assert_eq!(comparable(&now, &mut stored), same);
+        assert_eq!(stored, same, "the binary may have the modified script by now");
     }
 
     #[test]

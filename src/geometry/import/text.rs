@@ -43,8 +43,11 @@ pub(super) fn numbered_lines(text: &str) -> impl Iterator<Item = (usize, Cow<'_,
     std::iter::from_fn(move || {
         let (first, number) = lines.next()?;
         let mut line = Cow::from(first);
-        while let Some(begin) = line.strip_suffix('\\').filter(|begin| !begin.starts_with('#')) {
-            line = format!("{begin} {}", lines.next().map_or("", |(next, _)| next)).into();
+        while line.ends_with('\\') && !line.starts_with('#') {
+            let line = line.to_mut();
+            line.pop();
+            line.push(' ');
+            line.push_str(lines.next().map_or("", |(next, _)| next));
         }
         Some((number, line))
     })

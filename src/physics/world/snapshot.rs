@@ -134,7 +134,10 @@ impl World {
     pub fn patch(&self, collider: ColliderId) -> ContactPatch {
         let mut points =
             self.solved_points(|own, partner| own == collider && !self.are_resting(own, partner));
-        points.extend(self.resting.iter().filter(|(own, _)| *own == collider).cloned());
+        let rests = |(own, point): &&(ColliderId, PatchPoint)| {
+            *own == collider && self.are_resting(*own, point.partner)
+        };
+        points.extend(self.resting.iter().filter(rests).cloned());
         ContactPatch { collider, points: points.into_iter().map(|(_, point)| point).collect() }
     }
 
