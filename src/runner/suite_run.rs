@@ -30,7 +30,7 @@ use softvt_rollout::{
     Simulation, StatePredicate, check_goal, check_sensors, cost_warning,
 };
 use softvt_scene::{Body, Object, Scene};
-use softvt_script::{EpisodeSetup, LoadedScript, SceneChanges};
+use softvt_script::{EpisodeSetup, LoadedScript, SceneBuilder, SceneChanges};
 
 /// Episodes per task whose scenes are built before a run, to find all assets and the limits that are missing.
 const MAX_SCANNED_EPISODES: usize = 100;
@@ -297,10 +297,12 @@ impl<'a> SuiteRun<'a> {
             Some(_) => (0..self.config.episodes_of(self.suite)).take(MAX_SCANNED_EPISODES).collect(),
             None => of_task.take(MAX_SCANNED_EPISODES).collect(),
         };
-        let mut found = BTreeMap::new();
+        let (mut found, changes) = (BTreeMap::new(), self.changes());
+        // Errors are told when the episode is run. The episodes of a task share a virtual machine, in their order, so
+        // that what it keeps of one for the next does not depend on threads.
+        let Ok(builder) = SceneBuilder::open(self.loaded) else { return Ok(found) };
         for episode in episodes {
-            // Errors are told when the episode is run.
-            let Ok(opened) = self.open_episode(&self.episode_id(task, episode)) else { break };
+            let Ok(opened) = builder.build(&self.episode_id(task, episode), &changes) else { break };
             found.insert(EpisodeIndex { task: task.id, episode }, self.limits_of(task, &opened.scene)?);
         }
         Ok(found)

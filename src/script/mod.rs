@@ -22,7 +22,7 @@ pub use plan::{
     variation_file::{PlanVariationError, STANDARD_VARIATION, load_variation},
 };
 pub use run::{
-    episode::{EpisodeSetup, SceneChanges, ShiftError, check_shift},
+    episode::{EpisodeSetup, SceneBuilder, SceneChanges, ShiftError, check_shift},
     experiment::{Experiment, ExperimentRow, ExperimentSummary},
     expert::{BlindGrip, ExpertController, ExpertGrip},
 };

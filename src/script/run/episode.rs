@@ -114,8 +114,9 @@ impl EpisodeSetup {
     }
 }
 
-/// Builds the scene of an episode in a new virtual machine, so that no other episode has changed its global state.
-struct SceneBuilder {
+/// Builds the scenes of several episodes in one virtual machine, for looks at them without a simulation. Global state
+/// that one layout changes is seen by the next.
+pub struct SceneBuilder {
     instance: Arc<ScriptInstance>,
     /// The suites of the plan, by name.
     suites: BTreeMap<String, Suite>,
@@ -127,7 +128,7 @@ impl SceneBuilder {
     ///
     /// # Errors
     /// If the script fails.
-    fn open(loaded: &LoadedScript) -> Result<Self, ScriptError> {
+    pub fn open(loaded: &LoadedScript) -> Result<Self, ScriptError> {
         let suites = loaded.plan.suites().iter().map(|suite| (suite.name.clone(), suite.clone()));
         let instance = Arc::new(loaded.sources.instance()?);
         Ok(Self { instance, suites: suites.collect(), secret: loaded.secret.clone() })
@@ -137,7 +138,7 @@ impl SceneBuilder {
     ///
     /// # Errors
     /// As [`EpisodeSetup::open`].
-    fn build(&self, id: &EpisodeId, changes: &SceneChanges) -> Result<EpisodeSetup, ScriptError> {
+    pub fn build(&self, id: &EpisodeId, changes: &SceneChanges) -> Result<EpisodeSetup, ScriptError> {
         let vm = &self.instance.vm;
         let FoundTask { suite, task } = self.instance.find_task(&id.suite, id.task)?;
         self.check_suite(&suite).map_err(|e| vm.explain(&e))?;
