@@ -58,18 +58,25 @@ fn selected_episodes_are_those_of_a_whole_run() {
 }
 
 #[test]
-fn limits_in_run_json_are_of_fresh_interpreters_for_any_threads() {
+fn limits_in_run_json_do_not_depend_on_threads() {
     let scene = "softvt.layout(\"one\", function(scene)\n";
     let counted = "count = count + 1 local cube = softvt.asset { name = \"cube\" .. count, shape = shape, \
                    body = softvt.soft { youngs_pa = 2e4, poisson = 0.3, density = 300 } }\n";
     let text = Small { task: "budget_steps = 2", ..Small::default() }.text();
     let text = format!("local count = 0\n{}", text.replace(scene, &format!("{scene}{counted}")));
+    let wait = "local function wait(prompt) return softvt.task { prompt = prompt, layout = layout, budget_steps = 2,\n\
+                goal = softvt.on { object = \"cube\", target = \"post\" } } end\nreturn softvt.suite";
+    let text = text
+        .replace("return softvt.suite", wait)
+        .replace("tasks = {\n", "tasks = { wait 'a', wait 'b', wait 'c',\n");
     let project = Project::new(&[("x.lua", &text)]);
     for threads in [1, 2] {
         let run = project.run("x.lua").episodes(3).policy("noop").threads(threads);
         let records = run.out(&threads.to_string()).finish().records();
         assert!(records.iter().all(|record| record.header.asset == "cube1"), "{records:#?}");
+        // The episodes of a task are scanned in one interpreter, in their order.
         let limits = &project.json(&format!("{threads}/run.json"))["thresholds"];
-        assert_eq!(*limits, serde_json::json!({ "cube1": null }), "{threads} threads");
+        let expected = serde_json::json!({ "cube1": null, "cube2": null, "cube3": null });
+        assert_eq!(*limits, expected, "{threads} threads");
     }
 }
