@@ -116,7 +116,7 @@ impl SuiteChecker<'_> {
         if !kept.contains(&true) {
             return None;
         }
-        // What may support a kept object is kept, and what may support that.
+        // Keeps the objects that may support a kept one, and those that may support them.
         loop {
             let supports =
                 |own: &Aabb| boxes.iter().zip(&kept).any(|(other, kept)| *kept && overlaps(own, other));

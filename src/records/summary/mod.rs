@@ -492,7 +492,7 @@ impl SuiteSummary {
     }
 }
 
-/// What tables add to the name of a policy.
+/// Marks that tables add to the name of a policy.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct MethodMarks {
     /// It saw the true state.
