@@ -2,7 +2,7 @@
 //!
 //! Each module is a crate, `softvt-geometry` to `softvt-cli`; this crate re-exports them. They form layers, and each
 //! uses only those before it: [`geometry`] → [`physics`] → [`scene`], [`robot`] → [`sensing`], [`evaluation`] →
-//! [`records`], [`benchmark`] → [`policy`] → [`rollout`] → [`dataset`] → [`report`], [`script`], [`serve`] → [`runner`]
+//! [`runs`], [`benchmark`] → [`policy`] → [`rollout`] → [`dataset`] → [`report`], [`script`], [`serve`] → [`runner`]
 //! → [`cli`]. `docs/architecture.md` draws them and follows one episode. All of them may use [`text`] (numbers and text
 //! in messages), [`files`] (atomic files), [`npy`] (numpy files), [`parallel`] (jobs on threads), [`cancel`] (requests
 //! to stop), [`episode_id`], [`range`] (ranges of numbers) and [`settings`](mod@settings) (the declaration of
@@ -41,8 +41,6 @@ pub use softvt_media as media;
 pub use softvt_physics as physics;
 #[doc(inline)]
 pub use softvt_policy as policy;
-#[doc(inline)]
-pub use softvt_records as records;
 #[cfg(feature = "runner")]
 #[doc(inline)]
 pub use softvt_report as report;
@@ -53,6 +51,8 @@ pub use softvt_rollout as rollout;
 #[cfg(feature = "runner")]
 #[doc(inline)]
 pub use softvt_runner as runner;
+#[doc(inline)]
+pub use softvt_runs as runs;
 #[doc(inline)]
 pub use softvt_scene as scene;
 #[cfg(feature = "runner")]

@@ -3,7 +3,6 @@
 use softvt_benchmark::CONTROL_DT;
 use softvt_geometry::Vec3;
 use softvt_policy::{Action, profile::GripCode};
-use softvt_records::record::EpisodeRecord;
 use softvt_robot::{
     GripTarget,
     gripper::{self, MAX_WIDTH},
@@ -12,6 +11,7 @@ use softvt_robot::{
     rotation,
 };
 use softvt_rollout::{FinishedEpisode, Sensors, StateRecording};
+use softvt_runs::record::EpisodeRecord;
 use softvt_scene::STANDARD_CAMERAS;
 use softvt_sensing::tactile::{MARKER_COUNT, Markers};
 

@@ -9,7 +9,7 @@ use super::{
     layout::{MANIFEST, TaskPaths, VIDEO_STREAMS},
 };
 use softvt_common::files;
-use softvt_records::record::{DemonstrationOrigin, EpisodeRecord};
+use softvt_runs::record::{DemonstrationOrigin, EpisodeRecord};
 
 /// Version of the format.
 pub const SCHEMA_VERSION: u32 = 1;

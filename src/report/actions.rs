@@ -14,9 +14,9 @@ use softvt_common::{
     npy::{NpyArray, NpyError},
 };
 use softvt_policy::{Action, GripTarget};
-use softvt_records::record::EpisodeRecord;
 use softvt_robot::panda::ARM_DOFS;
 use softvt_rollout::checksum;
+use softvt_runs::record::EpisodeRecord;
 
 /// Numbers per action: of the pose and the closure, with a grip force, with joint positions.
 const WIDTH: usize = 7;

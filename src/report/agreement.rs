@@ -19,7 +19,7 @@ use softvt_evaluation::{
     thresholds::{AssetThreshold, ThresholdFile},
     verdict::{InvalidReason, Outcome, TargetVerdict},
 };
-use softvt_records::{
+use softvt_runs::{
     paired_stats::{PairedComparison, pair_episodes},
     record::EpisodeRecord,
 };

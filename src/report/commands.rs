@@ -5,7 +5,7 @@ use std::path::Path;
 use super::stored_run::StoredRun;
 use softvt_common::episode_id::EpisodeId;
 use softvt_evaluation::category::EpisodeCategory;
-use softvt_records::{paired_stats::d_over_tau, record::EpisodeRecord};
+use softvt_runs::{paired_stats::d_over_tau, record::EpisodeRecord};
 
 /// The command that renders an episode.
 pub fn view_command(run: &StoredRun, id: &EpisodeId) -> String {

@@ -16,7 +16,7 @@ use super::{
 use softvt_benchmark::run_changes::RunChanges;
 use softvt_common::text::{TextColumn, TextTable, counted, decimal, shortened};
 use softvt_evaluation::stage::TaskStage;
-use softvt_records::{
+use softvt_runs::{
     paired_stats::{
         EpisodeKey, EpisodePair, PairedComparison, PairedDifference, PairedStages, group_by_task,
         pair_episodes,

@@ -10,7 +10,7 @@ use super::{
     tables::{ResultTable, strings},
 };
 use softvt_evaluation::statistics::{Distribution, Rate};
-use softvt_records::{
+use softvt_runs::{
     paired_stats::{EpisodePair, PairedComparison, PairedDifference, d_over_tau, pair_episodes},
     record::EpisodeRecord,
     summary::GroupScores,

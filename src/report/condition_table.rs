@@ -10,7 +10,7 @@ use super::{
 use softvt_benchmark::ShiftValue;
 use softvt_common::text::{TextColumn, TextTable, counted, decimal, escape_control, shortened};
 use softvt_evaluation::statistics::{Distribution, Rate};
-use softvt_records::{
+use softvt_runs::{
     paired_stats::{PairedComparison, PairedDifference, pair_episodes},
     record::EpisodeRecord,
     summary::GroupScores,

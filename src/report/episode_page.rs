@@ -17,8 +17,8 @@ use softvt_common::{
     text::escape_control,
 };
 use softvt_evaluation::stage::TaskStage;
-use softvt_records::record::EpisodeRecord;
 use softvt_rollout::StateRecording;
+use softvt_runs::record::EpisodeRecord;
 
 /// Name of the page in the folder of the stills.
 pub const PAGE: &str = "index.html";

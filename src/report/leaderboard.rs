@@ -9,7 +9,7 @@ use sha2::{Digest, Sha256};
 use super::{comparison::in_project, run_summary::RunSummary, stored_run::StoredRun};
 use softvt_common::text::hex;
 use softvt_evaluation::statistics::Rate;
-use softvt_records::summary::SuiteSummary;
+use softvt_runs::summary::SuiteSummary;
 
 /// The results of one run, and all that they depend on.
 #[derive(Clone, Debug, PartialEq, Serialize)]

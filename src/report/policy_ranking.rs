@@ -10,7 +10,7 @@ use super::{
 };
 use softvt_common::text::{TextColumn, TextTable, counted, decimal, shortened};
 use softvt_evaluation::{category::EpisodeCategory, statistics::Rate};
-use softvt_records::{
+use softvt_runs::{
     paired_stats::{EpisodePair, PairedComparison, pair_episodes},
     paired_tests::{holm, letters},
     record::EpisodeRecord,

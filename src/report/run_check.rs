@@ -9,7 +9,7 @@ use serde_json::{Value, json};
 use softvt_benchmark::{CONTROL_DT, run_changes::RunChanges};
 use softvt_common::episode_id::{EpisodeId, EpisodeSplit};
 use softvt_evaluation::criteria::SuccessCriteria;
-use softvt_records::record::EpisodeRecord;
+use softvt_runs::record::EpisodeRecord;
 
 /// Differences that rounding explains, relative to 1.
 const ROUNDING: f64 = 1e-6;

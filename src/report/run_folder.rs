@@ -14,7 +14,7 @@ use softvt_common::{
     files::{self, FileError},
     journal::{Journal, JournalError, whole_lines},
 };
-use softvt_records::{record::EpisodeRecord, record_check::RecordError};
+use softvt_runs::{record::EpisodeRecord, record_check::RecordError};
 
 /// One line per episode.
 pub const EPISODES: &str = "episodes.jsonl";

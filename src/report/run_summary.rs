@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use super::{comparison::difference_warnings, stored_run::StoredRun};
 use softvt_common::text::decimal;
 use softvt_evaluation::{drop::DropReason, verdict::Outcome};
-use softvt_records::{
+use softvt_runs::{
     record::{EpisodeRecord, SoftTarget},
     summary::{MethodMarks, SuiteSummary},
 };

@@ -17,7 +17,7 @@ use super::{
 use softvt_common::episode_id::EpisodeIndex;
 use softvt_common::files::{self, FileError};
 use softvt_evaluation::thresholds::{ThresholdError, ThresholdFile};
-use softvt_records::{record::EpisodeRecord, summary::SuiteSummary};
+use softvt_runs::{record::EpisodeRecord, summary::SuiteSummary};
 
 /// Error of merging shards.
 #[allow(missing_docs, reason = "the messages describe the variants")]

@@ -16,7 +16,7 @@ use super::{
 use softvt_benchmark::run_changes::RunChanges;
 use softvt_common::episode_id::EpisodeIndex;
 use softvt_common::files::{self, FileError};
-use softvt_records::{
+use softvt_runs::{
     record::{EpisodeRecord, PRIVILEGED_POLICIES},
     summary::MethodMarks,
 };

@@ -11,8 +11,8 @@ use softvt_evaluation::{
     category::EpisodeCategory,
     statistics::{Distribution, Rate},
 };
-use softvt_records::paired_tests::{DetectableDifference, MIN_DISCORDANT};
-use softvt_records::summary::{
+use softvt_runs::paired_tests::{DetectableDifference, MIN_DISCORDANT};
+use softvt_runs::summary::{
     AbortedEpisode, CommandCounts, GroupScores, InvalidEpisode, SuiteSummary, TaskScores, TauRange,
 };
 
@@ -324,7 +324,7 @@ mod tests {
     use super::*;
     use crate::sample_record;
     use softvt_evaluation::verdict::Outcome;
-    use softvt_records::record::{EpisodeRecord, UnreachableCommand};
+    use softvt_runs::record::{EpisodeRecord, UnreachableCommand};
 
     fn episode(task: usize, prompt: &str, edit: impl Fn(&mut EpisodeRecord)) -> EpisodeRecord {
         let mut record = sample_record();

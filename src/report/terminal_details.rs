@@ -6,7 +6,7 @@ use softvt_evaluation::{
     safety::KAPPAS,
     statistics::{Distribution, Rate},
 };
-use softvt_records::{
+use softvt_runs::{
     paired_tests::DetectableDifference,
     summary::{EpisodeDeformation, GroupScores, SuiteSummary},
 };

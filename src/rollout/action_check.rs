@@ -2,11 +2,11 @@
 
 use softvt_geometry::Pose;
 use softvt_policy::Action;
-use softvt_records::record::{JointOutsideLimits, UnreachableCommand};
 use softvt_robot::{
     ik::{ArmAngles, LINEARISATION_RANGE, PoseDifference},
     panda, rotation,
 };
+use softvt_runs::record::{JointOutsideLimits, UnreachableCommand};
 
 /// The command, if it is farther from the tool than one step of the inverse kinematics reaches, both in the base frame,
 /// or outside of the joints' limits.

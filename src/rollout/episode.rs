@@ -45,8 +45,8 @@ use softvt_physics::{
     world::{StepFailure, WorldSnapshot},
 };
 use softvt_policy::{Action, Observation, PolicyError, SensorStreams};
-use softvt_records::record::{EpisodeHeader, EpisodeRecord, RolloutStats, UnreachableCommand};
 use softvt_robot::{Side, ik::ArmAngles, panda::ARM_DOFS, rotation};
+use softvt_runs::record::{EpisodeHeader, EpisodeRecord, RolloutStats, UnreachableCommand};
 use softvt_scene::{Asset, Body, Camera, Scene};
 use softvt_sensing::{camera::RenderScene, tactile::TactileReading};
 

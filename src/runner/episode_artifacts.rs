@@ -13,13 +13,13 @@ use softvt_common::cancel;
 use softvt_common::episode_id::EpisodeIndex;
 use softvt_common::files;
 use softvt_evaluation::judge::ControlStepScore;
-use softvt_records::record::EpisodeRecord;
 use softvt_report::{
     actions, mcap,
     softvtbench_files::{self, DebugFrame, DebugShape},
     video::{self, VideoCaption},
 };
 use softvt_rollout::FinishedEpisode;
+use softvt_runs::record::EpisodeRecord;
 
 /// Episodes of a run that become videos or MCAP files.
 #[derive(Clone, Debug, PartialEq, Eq)]

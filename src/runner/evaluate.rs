@@ -24,7 +24,6 @@ use softvt_common::episode_id::EpisodeIndex;
 use softvt_common::{files, parallel, text::counted};
 use softvt_evaluation::{category::EpisodeCategory, verdict::Outcome};
 use softvt_policy::PolicyError;
-use softvt_records::{record::EpisodeRecord, summary::SuiteSummary};
 use softvt_report::{
     actions,
     run_check::{RecordContradiction, first_contradiction},
@@ -32,6 +31,7 @@ use softvt_report::{
     softvtbench_files,
 };
 use softvt_rollout::{Episode, FinishedEpisode};
+use softvt_runs::{record::EpisodeRecord, summary::SuiteSummary};
 
 /// The episodes of a finished run, in order, with their summary.
 #[derive(Clone, Debug)]

@@ -657,7 +657,7 @@ fn refuse_options_without_effect(args: &PolicyOptions) -> Result<(), RunError> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use softvt_records::record::PRIVILEGED_POLICIES;
+    use softvt_runs::record::PRIVILEGED_POLICIES;
 
     #[test]
     fn built_in_policies_have_names_and_those_of_privileged_ones_are_listed() {

@@ -43,9 +43,9 @@ use softvt_dataset::{
 };
 use softvt_evaluation::verdict::Outcome;
 use softvt_policy::{builtin::RecordedPolicy, profile::GripCode};
-use softvt_records::record::{DemonstrationOrigin, EpisodeRecord};
 use softvt_report::{actions, run_folder::RunFolder};
 use softvt_rollout::{ChunkedPolicy, EpisodeError, FinishedEpisode, SettleError};
+use softvt_runs::record::{DemonstrationOrigin, EpisodeRecord};
 use softvt_scene::InitialStateOverride;
 use softvt_script::LoadedScript;
 

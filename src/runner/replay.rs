@@ -31,9 +31,9 @@ use softvt_dataset::{
 };
 use softvt_evaluation::verdict::Outcome;
 use softvt_policy::{Action, builtin::RecordedPolicy};
-use softvt_records::record::EpisodeRecord;
 use softvt_report::{actions, stored_run::StoredRun};
 use softvt_rollout::{ChunkedPolicy, FinishedEpisode, StateRecording};
+use softvt_runs::record::EpisodeRecord;
 use softvt_script::LoadedScript;
 
 /// A controller factory that repeats the actions of a recorded episode, and its error if it ended with one.

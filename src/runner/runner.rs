@@ -17,7 +17,7 @@ use crate::{
     suite_run::SuiteRun,
 };
 use softvt_benchmark::{Plan, ShiftValue};
-use softvt_records::record::EpisodeRecord;
+use softvt_runs::record::EpisodeRecord;
 use softvt_script::LoadedScript;
 
 /// Runs the suites of a loaded script. Without an output folder, nothing is written.

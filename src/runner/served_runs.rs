@@ -12,9 +12,9 @@ use crate::{
 use softvt_common::cancel::{self, CancelFlag};
 use softvt_common::episode_id::{EpisodeId, EpisodeIndex};
 use softvt_common::{parallel::lock, text::counted};
-use softvt_records::summary::SuiteSummary;
 use softvt_report::run_folder::RunFolder;
 use softvt_rollout::FinishedEpisode;
+use softvt_runs::summary::SuiteSummary;
 use softvt_serve::{EpisodeRecorder, RequestError};
 
 /// The run folders of a server.

@@ -24,11 +24,11 @@ use softvt_common::episode_id::{EpisodeId, EpisodeIndex, EpisodeSplit};
 use softvt_common::{parallel, text::unknown_name};
 use softvt_dataset::card::ImportedFile;
 use softvt_policy::{EpisodeBrief, PolicyError, SensorStreams, remote::PolicyConnections};
-use softvt_records::record::{DemonstrationOrigin, PRIVILEGED_POLICIES};
 use softvt_rollout::{
     AssetCache, Episode, EpisodeError, EpisodeSpec, FinishedEpisode, SceneBuildError, SensorAssets, Sensors,
     Simulation, StatePredicate, check_goal, check_sensors, cost_warning,
 };
+use softvt_runs::record::{DemonstrationOrigin, PRIVILEGED_POLICIES};
 use softvt_scene::{Body, Object, Scene};
 use softvt_script::{EpisodeSetup, LoadedScript, SceneBuilder, SceneChanges};
 

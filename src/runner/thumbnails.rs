@@ -10,9 +10,9 @@ use crate::{
     replay::StoredManifest,
     suite_run::SuiteRun,
 };
-use softvt_records::record::EpisodeRecord;
 use softvt_report::{page::Thumbnails, stored_run::StoredRun};
 use softvt_rollout::{Sensors, Simulation};
+use softvt_runs::record::EpisodeRecord;
 
 /// Edge of a picture, pixels.
 const EDGE: usize = 128;

@@ -4,7 +4,7 @@ use std::sync::OnceLock;
 
 use softvt::{
     evaluation::verdict::{Outcome, Verdict},
-    records::record::EpisodeRecord,
+    runs::record::EpisodeRecord,
 };
 
 use crate::support::{Project, Run, SPATIAL_SOFT};

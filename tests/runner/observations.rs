@@ -8,9 +8,9 @@ use softvt::{
     policy::{
         Action, ActionChunk, EpisodeBrief, Observation, Policy, PolicyError, RobotState, SensorStreams,
     },
-    records::{record::EpisodeRecord, summary::SuiteSummary},
     report::{styled_text::TerminalFormat, terminal},
     rollout::{AssetCache, ChunkedPolicy, Episode, EpisodeSpec, SensorAssets, Sensors, Simulation},
+    runs::{record::EpisodeRecord, summary::SuiteSummary},
     script::{self, LoadedScript},
     sensing::tactile::TactileMosaicLayout,
 };

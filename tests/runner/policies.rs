@@ -5,9 +5,9 @@ use std::{net::TcpListener, time::Duration};
 use softvt::{
     evaluation::{stage::TaskStage, verdict::Outcome},
     policy::{builtin::NoopPolicy, profile::GripCode, remote::ServerProtocol},
-    records::record::EpisodeRecord,
     report::{comparison, styled_text::TerminalFormat},
     runner::PolicyConfig,
+    runs::record::EpisodeRecord,
 };
 
 use crate::support::{

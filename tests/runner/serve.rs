@@ -15,11 +15,11 @@ use rmpv::Value;
 use softvt::{
     cancel::CancelFlag,
     episode_id::EpisodeSplit,
-    records::summary::SuiteSummary,
     runner::{
         PolicyConfig, PolicyOptions, RunConfig, RunError, ServedRuns, check_served, first_observation,
         prepare_served, server_config,
     },
+    runs::summary::SuiteSummary,
     serve::{self, AccessRules},
 };
 use tungstenite::{Error, Message};

@@ -6,8 +6,8 @@ use rmpv::Value;
 use softvt::{
     episode_id::{EpisodeIndex, EpisodeSplit},
     policy::{Action, profile::GripCode},
-    records::summary::SuiteSummary,
     report::{actions, comparison, styled_text::TerminalFormat, terminal},
+    runs::summary::SuiteSummary,
 };
 
 use crate::{

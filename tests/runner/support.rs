@@ -12,7 +12,6 @@ use softvt::{
     benchmark::{Plan, ShiftValue, seed::SecretSeed},
     parallel::lock,
     policy::profile::GripCode,
-    records::record::EpisodeRecord,
     report::{
         comparison::{self, Comparison},
         condition_table::ConditionTable,
@@ -30,6 +29,7 @@ use softvt::{
         replay::{self, SecretFile},
         selection::check_distinct_out_dirs,
     },
+    runs::record::EpisodeRecord,
     script::{ExperimentInput, ExperimentRow},
 };
 

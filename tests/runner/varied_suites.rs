@@ -1,12 +1,12 @@
 //! Suites whose objects vary from episode to episode: records, names, reproducibility, and what is refused.
 
 use softvt::{
-    records::record::EpisodeRecord,
     report::{
         condition_table::{compares_policies, controllers_table},
         styled_text::TerminalFormat,
     },
     runner::{Runner, TraceDetail},
+    runs::record::EpisodeRecord,
     scene::ObjectVariation,
     script::STANDARD_VARIATION,
 };

@@ -12,7 +12,6 @@ use crate::{
 };
 use softvt_benchmark::Plan;
 use softvt_policy::profile::Profile;
-use softvt_records::{requirement::Requirement, summary::SuiteSummary};
 use softvt_report::{
     commands::next_commands,
     condition_table::{ConditionTable, compares_policies, controllers_table, table},
@@ -25,6 +24,7 @@ use softvt_runner::{
     experiment::{self, ExperimentOutput},
     selection::{check_distinct_out_dirs, check_parent_folder, next_run_dir},
 };
+use softvt_runs::{requirement::Requirement, summary::SuiteSummary};
 use softvt_script::ExperimentRow;
 
 /// A safety-aware visuo-tactile manipulation benchmark for soft objects, on an ordinary CPU

@@ -15,7 +15,6 @@ use softvt_common::{
     files::{self, FileError},
     parallel,
 };
-use softvt_records::record::EpisodeRecord;
 use softvt_report::{
     episode_page::{self, DeformationTimes, PolicyPart},
     mcap::write_mcap,
@@ -31,6 +30,7 @@ use softvt_runner::{
     ConfiguredScript, EpisodeJob, EpisodeList, PreparedRun, RunConfig, RunError, SuiteRun,
     selection::path_component,
 };
+use softvt_runs::record::EpisodeRecord;
 
 /// Render one episode: a video, and stills of every camera and tactile sensor
 #[derive(Args, Clone, Debug)]

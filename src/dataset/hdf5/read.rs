@@ -21,8 +21,8 @@ use super::{
 use softvt_common::files::FileError;
 use softvt_geometry::Vec3;
 use softvt_policy::{Action, profile::GripCode};
-use softvt_records::record::EpisodeRecord;
 use softvt_robot::{ik::ArmAngles, panda::ARM_DOFS};
+use softvt_runs::record::EpisodeRecord;
 
 /// The HDF5 file of a task, with the demonstrations `/data/demo_0`, `/data/demo_1`, …
 pub struct TaskFile {

@@ -8,7 +8,7 @@ use serde_json::{Value, json};
 use super::super::{DataStream, DatasetError, Demonstration, StreamValues};
 use softvt_benchmark::CONTROL_HZ;
 use softvt_common::files;
-use softvt_records::record::EpisodeRecord;
+use softvt_runs::record::EpisodeRecord;
 
 /// Largest chunk of numbers, bytes. Readers of one step decompress a whole chunk.
 const MAX_CHUNK_BYTES: usize = 1 << 18;

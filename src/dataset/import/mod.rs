@@ -23,7 +23,7 @@ use softvt_common::episode_id::EpisodeSplit;
 use softvt_common::files::FileError;
 use softvt_common::text::hex;
 use softvt_policy::ToolCommand;
-use softvt_records::record::EpisodeRecord;
+use softvt_runs::record::EpisodeRecord;
 
 pub use foreign::{
     ForeignDemo, ForeignFile, ForeignFormat, ForeignObjectPose, ForeignTask, InitialCondition,

@@ -12,9 +12,9 @@ use image::RgbImage;
 use softvt_geometry::Pose;
 use softvt_media::jpeg::encode_jpeg;
 use softvt_physics::world::WorldSnapshot;
-use softvt_records::record::EpisodeRecord;
 use softvt_robot::gripper;
 use softvt_rollout::{Proprioception, Sensors};
+use softvt_runs::record::EpisodeRecord;
 use softvt_scene::Camera;
 
 /// Quality of the images, 1 to 100.

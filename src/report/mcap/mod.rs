@@ -46,9 +46,9 @@ use softvt_common::{
     parallel,
 };
 use softvt_physics::world::WorldSnapshot;
-use softvt_records::record::EpisodeRecord;
 use softvt_robot::Side;
 use softvt_rollout::{SensingError, Sensors, StateRecording};
+use softvt_runs::record::EpisodeRecord;
 use softvt_scene::Camera;
 
 /// Edge of the camera images, pixels: that of the profiles.

@@ -18,7 +18,7 @@ use crate::{
 use softvt_common::episode_id::EpisodeId;
 use softvt_common::text::counted;
 use softvt_evaluation::category::EpisodeCategory;
-use softvt_records::{paired_stats::d_over_tau, record::EpisodeRecord};
+use softvt_runs::{paired_stats::d_over_tau, record::EpisodeRecord};
 
 /// Largest number of episodes of a category listed per run.
 const MAX_LISTED: usize = 24;

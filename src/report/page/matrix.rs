@@ -14,7 +14,7 @@ use super::{
 };
 use crate::{run_summary::RunSummary, task_names::object_name, terminal::tau_range, video::video_path};
 use softvt_evaluation::category::EpisodeCategory;
-use softvt_records::{
+use softvt_runs::{
     paired_stats::d_over_tau,
     record::EpisodeRecord,
     summary::{GroupScores, TauRange},

@@ -6,7 +6,7 @@ use super::marks::{x, y};
 use crate::run_summary::RunSummary;
 use softvt_common::text::shortened;
 use softvt_evaluation::statistics::Rate;
-use softvt_records::record::EpisodeRecord;
+use softvt_runs::record::EpisodeRecord;
 
 /// Height of the plot, pixels, and the margin above its highest line.
 const HEIGHT: f64 = 200.0;

@@ -8,7 +8,7 @@ use crate::{
     run_summary::RunSummary,
 };
 use softvt_evaluation::{category::EpisodeCategory, statistics::Distribution};
-use softvt_records::paired_stats::d_over_tau;
+use softvt_runs::paired_stats::d_over_tau;
 
 /// Height of a strip, pixels.
 const HEIGHT: f64 = 34.0;

@@ -9,7 +9,7 @@ use crate::{
     stored_run::StoredRun,
 };
 use softvt_media::palette::{Colour, DROPPED, FAINT, OVER_LIMIT, SAFE};
-use softvt_records::record::EpisodeRecord;
+use softvt_runs::record::EpisodeRecord;
 
 const HOSTILE: &str = "<script>alert('x')</script>\"&lt; | \\input{x}";
 

@@ -21,7 +21,7 @@ use softvt_evaluation::{
     thresholds::ThresholdFile,
 };
 use softvt_geometry::Vec3;
-use softvt_records::record::{EpisodeHeader, EpisodeRecord};
+use softvt_runs::record::{EpisodeHeader, EpisodeRecord};
 
 /// Folder within a run folder.
 pub const FOLDER: &str = "softvtbench";

@@ -13,7 +13,7 @@ use softvt_evaluation::{
     stage::TaskStage,
     statistics::{Distribution, Rate},
 };
-use softvt_records::summary::{EpisodeDeformation, GroupScores, TaskScores};
+use softvt_runs::summary::{EpisodeDeformation, GroupScores, TaskScores};
 
 /// Number of columns, from the left, that hold text; the others hold numbers.
 pub(super) const TEXT_COLUMNS: usize = 2;

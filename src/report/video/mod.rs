@@ -26,11 +26,11 @@ use softvt_media::{
     video::{VideoError, VideoWriter},
 };
 use softvt_physics::world::WorldSnapshot;
-use softvt_records::record::EpisodeRecord;
 use softvt_rollout::{
     CAMERA_IMAGE_SUFFIXES, CloseUp, SensingError, Sensors, StateRecording, TACTILE_IMAGE_SUFFIXES,
     TACTILE_IMAGES,
 };
+use softvt_runs::record::EpisodeRecord;
 use softvt_scene::{Camera, STANDARD_CAMERAS};
 use softvt_sensing::{
     camera::{RenderedImage, encode_png, resize},

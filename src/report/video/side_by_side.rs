@@ -15,8 +15,8 @@ use super::{
 use softvt_benchmark::CONTROL_DT;
 use softvt_common::{files::replace, parallel, text::shortened};
 use softvt_media::{animation, canvas::Canvas};
-use softvt_records::record::EpisodeRecord;
 use softvt_rollout::{CloseUp, StateRecording};
+use softvt_runs::record::EpisodeRecord;
 use softvt_sensing::camera::{encode_png, resize};
 
 /// Width of a column in units of the layout, in which the sizes of texts and plots are stated.

@@ -25,8 +25,8 @@ use softvt_dataset::{
     import::{self, ForeignDemo, ForeignFile, InitialCondition},
 };
 use softvt_policy::{ToolCommand, builtin::RecordedPolicy};
-use softvt_records::record::DemonstrationOrigin;
 use softvt_rollout::{ChunkedPolicy, target_asset};
+use softvt_runs::record::DemonstrationOrigin;
 use softvt_scene::{Body, InitialStateOverride};
 use task_matching::{MatchedDemo, match_demos};
 

@@ -243,7 +243,7 @@ impl PairedStages {
 /// Of 100 episodes, 4 succeed in the first run only, 12 in the second only and 50 in both.
 ///
 /// ```
-/// use softvt_records::paired_stats::PairedDifference;
+/// use softvt_runs::paired_stats::PairedDifference;
 ///
 /// let pairs = (0..100).map(|i| [i < 4 || i >= 50, i >= 4 && i < 16 || i >= 50]);
 /// let safety = PairedDifference::from_successes(pairs);

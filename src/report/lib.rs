@@ -32,6 +32,6 @@ pub mod video;
 
 /// A successful, safe soft episode.
 #[cfg(test)]
-pub(crate) fn sample_record() -> softvt_records::record::EpisodeRecord {
+pub(crate) fn sample_record() -> softvt_runs::record::EpisodeRecord {
     serde_json::from_str(include_str!("../../tests/data/episode_record.json")).expect("a valid record")
 }
