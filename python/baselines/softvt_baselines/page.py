@@ -1,8 +1,12 @@
-"""The page of a study: collects its runs, and writes tables and pictures of those that were collected."""
+"""The page of a study: collects its runs, and writes tables and pictures of the collected runs.
 
+In the folder `baselines` beside the page, `runs.csv` lists the runs, `outcomes/` has their episodes, and the other CSV files are the tables. The
+page has the rates alone.
+"""
+
+import csv
 import json
 import re
-import shutil
 from collections import Counter, defaultdict
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -11,10 +15,10 @@ import numpy as np
 
 from . import UserError, figure, results
 from .figure import Plot
-from .results import Run
+from .results import Estimate, Run
 from .study import ORIGIN
 
-# The tables stand between these lines of the page.
+# The table of rates stands between these lines of the page.
 BEGIN, END = "<!-- tables: softvt-baselines page -->", "<!-- end of tables -->"
 LEARNED = re.compile(
     r"(?P<suite>\w+)-(?P<inputs>(?:vo|vp|vt|vpt|vb|vi)2?)-(?P<code>[a-z-]+?)(?:-by-(?P<teacher>[a-z-]+))?-s(?P<seed>\d+)-r(?P<replan>\d+)(?P<condition>\+.*)?"
@@ -32,8 +36,9 @@ COMPARED += [(f"{one}2", f"{other}2") for one, other in COMPARED] + [(f"{one}2",
 MEASURES = ["goal", "no_drop", "safety"]
 # Stages of an episode, in their order.
 STAGES = ["reach", "grasp", "lift", "carry", "place", "release"]
-# Ratios from which on tables do not show them.
-MOST = 99
+# The list of the collected runs, its columns, and the folder of their episodes.
+RUNS, RUN_COLUMNS = "runs.csv", ["run", "finished", "softvt", "commit", "machine", "checkpoint_sha256"]
+OUTCOMES = "outcomes"
 # What the pictures show: suites in the order of their plots, inputs in that of their rows, grip codes, and steps per answer.
 SUITES = ["object_hidden", "spatial_hidden", "object_soft", "spatial_soft"]
 INPUT_WORDS = {"vo": "cameras", "vp": "with drives", "vt": "with touch", "vpt": "with both"}
@@ -55,43 +60,60 @@ class Policy:
 
 
 def collect(study: Path, into: Path) -> None:
-    """Copies the summaries and outcomes of the finished runs of a study. Raises UserError without any."""
+    """Copies the outcomes of the finished runs of a study. Raises UserError without any."""
     found = sorted(study.glob("runs/**/summary.json"))
     if not found:
         raise UserError(f"{study}: no finished runs; softvt-baselines study makes them")
+    listed = {row["run"]: row for row in _read(into / RUNS)}
     for summary in found:
         if summary.parent.name == "softvtbench":
             continue
         # Runs are in NAME (references), NAME/SUITE, or NAME/SCRIPT/CONDITION.
         name, *inner = summary.parent.relative_to(study / "runs").parts
-        folder, run = into / "+".join([name, *inner[1:]]), results.load(summary.parent)
-        _identify(folder, run.suite)
-        folder.mkdir(parents=True, exist_ok=True)
-        shutil.copy(summary, folder)
-        if (origin := summary.with_name(ORIGIN)).is_file():
+        name, run, origin = "+".join([name, *inner[1:]]), results.load(summary.parent), {}
+        _identify(name, run.suite)
+        if (path := summary.with_name(ORIGIN)).is_file():
             version = json.loads(summary.with_name("run.json").read_text())["softvt"]
-            (folder / ORIGIN).write_text(json.dumps({"softvt": version} | json.loads(origin.read_text()), indent=1) + "\n")
-        results.save(run, folder)
+            origin = {"softvt": version} | json.loads(path.read_text())
+        listed[name] = dict.fromkeys(RUN_COLUMNS, "") | origin | {"run": name, "finished": 1}
+        results.save(run, into / OUTCOMES / f"{name}.csv")
+    _write(into / RUNS, [{key: row[key] for key in RUN_COLUMNS} for _, row in sorted(listed.items())])
 
 
-def _identify(folder: Path, suite: str) -> Policy | str:
+def _read(path: Path) -> list[dict]:
+    if not path.is_file():
+        return []
+    with open(path, newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def _write(path: Path, rows: list[dict]) -> None:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with open(path, "w", newline="") as file:
+        table = csv.DictWriter(file, list(rows[0]) if rows else [], lineterminator="\n")
+        table.writeheader()
+        table.writerows(rows)
+
+
+def _identify(name: str, suite: str) -> Policy | str:
     """The policy of a collected run: a learned one, or the name of a reference. Raises UserError for other runs."""
-    if found := LEARNED.fullmatch(folder.name):
+    if found := LEARNED.fullmatch(name):
         part = found.groupdict()
         return Policy(
             part["suite"], part["code"], int(part["replan"]), part["inputs"], (part["condition"] or "")[1:], part["teacher"] or ""
         )
-    if (reference := folder.name.removeprefix(f"{suite}-")) in REFERENCES:
+    if (reference := name.removeprefix(f"{suite}-")) in REFERENCES:
         return reference
-    raise UserError(f"{folder}: not named as a run of a study")
+    raise UserError(f"{name}: not named as a run of a study")
 
 
 def _grouped(folder: Path) -> tuple[dict[Policy, list[Run]], dict[tuple[str, str], Run]]:
     """The collected runs of learned policies by policy, and those of the references by suite and name."""
     learned, references = defaultdict(list), {}
-    for path in sorted(folder.glob(f"*/{results.OUTCOMES}")):
-        run = results.load(path.parent)
-        policy = _identify(path.parent, run.suite)
+    unfinished = {row["run"] for row in _read(folder / RUNS) if row["finished"] != "1"}
+    for path in sorted((folder / OUTCOMES).glob("*.csv")):
+        run = results.load_collected(path, path.stem not in unfinished)
+        policy = _identify(path.stem, run.suite)
         if isinstance(policy, Policy):
             learned[policy].append(run)
         else:
@@ -99,26 +121,37 @@ def _grouped(folder: Path) -> tuple[dict[Policy, list[Run]], dict[tuple[str, str
     return learned, references
 
 
-def _table(heading: list[str], rows: list[list[str]]) -> str:
-    lines = [heading, ["---"] * len(heading), *rows]
-    return "".join(f"| {' | '.join(line)} |\n" for line in lines) + "\n"
-
-
-def _spread(values: np.ndarray) -> str:
-    """Median, and the 5th and 95th percentile. Where nothing has a limit, only invalid episodes have a ratio, which is infinite."""
+def _percentiles(name: str, values: np.ndarray) -> dict[str, str]:
+    """Columns of the 5th, 50th and 95th percentile. Where nothing has a limit, only invalid episodes have a ratio, which is infinite."""
+    names = [f"{name}_p5", f"{name}_median", f"{name}_p95"]
     if not np.isfinite(values).any():
-        return "–"
-    percentiles = np.nanpercentile(np.minimum(values, MOST), [5, 50, 95])
-    low, median, high = (f"{value:.2f}" if value < MOST else f"> {MOST}" for value in percentiles)
-    return f"{median} [{low}, {high}]"
+        return dict.fromkeys(names, "")
+    return {key: f"{value:.4g}" for key, value in zip(names, np.nanpercentile(values, [5, 50, 95], method="lower"))}
 
 
-def _row(name: str, runs: list[Run], replan: str) -> list[str]:
-    ratio, grip = (np.concatenate([getattr(run, key) for run in runs]) for key in ("ratio", "grip"))
-    grip = grip[np.concatenate([run.goal for run in runs]) == 1]
-    rates = [results.rate(runs, measure).text() for measure in MEASURES]
-    episodes = str(len(runs[0].task)) + ("" if all(run.is_finished for run in runs) else " (interrupted)")
-    return [name, replan, str(len(runs)), episodes, *rates, _spread(ratio), _spread(grip)]
+def _interval(name: str, of: Estimate) -> dict[str, str]:
+    """Columns of a mean and its 95 % interval."""
+    return {name: f"{of.mean:.1f}", f"{name}_low": f"{of.low:.1f}", f"{name}_high": f"{of.high:.1f}"}
+
+
+def _rates(learned: dict[Policy, list[Run]], references: dict[tuple[str, str], Run]) -> list[dict]:
+    """Rows of the policies without a shift, and of the references."""
+
+    def row(suite: str, name: str, replan: int | str, runs: list[Run]) -> dict:
+        ratio, grip = (np.concatenate([getattr(run, key) for run in runs]) for key in ("ratio", "grip"))
+        grip = grip[np.concatenate([run.goal for run in runs]) == 1]
+        columns = {"suite": suite, "policy": name, "replan": replan, "seeds": len(runs), "episodes": len(runs[0].task)}
+        columns["finished"] = int(all(run.is_finished for run in runs))
+        for measure in MEASURES:
+            columns |= _interval(measure, results.rate(runs, measure))
+        return columns | _percentiles("d_over_tau", ratio) | _percentiles("grip_ratio", grip)
+
+    rows = []
+    for suite in sorted({policy.suite for policy in learned} | {suite for suite, _ in references}):
+        of_suite = [policy for policy in sorted(learned) if (policy.suite, policy.condition) == (suite, "")]
+        rows += [row(suite, _name(policy), policy.replan, learned[policy]) for policy in of_suite]
+        rows += [row(suite, shown, "", [references[suite, name]]) for name, shown in REFERENCES.items() if (suite, name) in references]
+    return rows
 
 
 def _inputs(policy: Policy) -> str:
@@ -141,12 +174,11 @@ class Pair:
     more: list[Run]
 
     @property
-    def names(self) -> tuple[str, str]:
-        return _inputs(self.other), _inputs(self.policy)
-
-    @property
-    def difference(self) -> str:
-        return f"{self.names[1]} − {self.names[0]}"
+    def columns(self) -> dict:
+        """The first columns of its rows."""
+        first, second = (_inputs(self.other), _inputs(self.policy))
+        policy = self.policy
+        return {"suite": policy.suite, "difference": f"{second} − {first}", "code": policy.code, "replan": policy.replan}
 
 
 def _seeds(runs: list[Run]) -> dict[str, Run]:
@@ -166,66 +198,30 @@ def _pairs(learned: dict[Policy, list[Run]]) -> list[Pair]:
     return pairs
 
 
-def tables(folder: Path) -> str:
-    """All tables, in Markdown."""
+def tables(folder: Path) -> dict[str, list[dict]]:
+    """The rows of all tables, by the name of their file."""
     learned, references = _grouped(folder)
-    text = "Rates are means over the training seeds; intervals (95 %, bootstrap) are over the episodes and, of several, the seeds.\n\n"
-    for suite in sorted({policy.suite for policy in learned} | {suite for suite, _ in references}):
-        text += f"### `{suite}`\n\n"
-        rows = [
-            _row(_name(policy), runs, str(policy.replan))
-            for policy, runs in sorted(learned.items())
-            if (policy.suite, policy.condition) == (suite, "")
-        ]
-        rows += [_row(shown, [references[suite, name]], "") for name, shown in REFERENCES.items() if (suite, name) in references]
-        text += _table(["policy", "replan", "seeds", "episodes", "Goal, %", "NoDrop, %", "Safety, %", "D/τ", "grip ratio"], rows)
-        text += _origin(folder, suite)
     pairs = [pair for pair in _pairs(learned) if pair.policy.condition != UNCHANGED]
-    if pairs:
-        text += (
-            "### Differences, on the episodes and the training seeds that both have\n\n*Both succeed*: Safety of the episodes in which both reach "
-            "the goal.\n\n"
-        )
-        measures = [f"{measure}, points" for measure in ("Goal", "NoDrop", "Safety")]
-        heading = [
-            "suite",
-            "inputs",
-            "grip code",
-            "replan",
-            "seeds",
-            "shift",
-            "episodes",
-            *measures,
-            "both succeed",
-            "Safety there, points",
-        ]
-        text += _table(heading, [_difference(pair) for pair in pairs])
-    if compared := _against_references(learned, references):
-        text += "### Differences from reference controllers, on the episodes that both have\n\n"
-        text += _table(["suite", "difference", "replan", "seeds", "episodes", "Goal, points", "Safety, points"], compared)
-    for pair in pairs:
-        policy = pair.policy
-        if not policy.condition:
-            text += f"### `{policy.suite}`, {pair.difference}, {policy.code}, replan {policy.replan}: by task and by stage\n\n"
-            text += "Safety by task, and the stages in which episodes without success ended, on the same episodes and seeds.\n\n"
-            text += _by_task(pair) + _by_stage(pair)
-    if shifted := _shifts(learned):
-        text += "### Shifts\n\nThe change is that against the same policy without a shift, on the same episodes.\n\n"
-        text += _table(["suite", "policy", "replan", "seeds", "shift", "Goal, %", "Safety, %", "change of Safety, points"], shifted)
-    return text
+    unshifted = [pair for pair in pairs if not pair.policy.condition]
+    return {
+        "rates": _rates(learned, references),
+        "differences": [_difference(pair) for pair in pairs],
+        "references": _against_references(learned, references),
+        "tasks": [row for pair in unshifted for row in _by_task(pair)],
+        "stages": [row for pair in unshifted for row in _by_stage(pair)],
+        "shifts": _shifts(learned),
+    }
 
 
-def _origin(folder: Path, suite: str) -> str:
-    """Where the runs of a suite come from, as far as they say it."""
-    places, weights = set(), []
-    for path in sorted(folder.glob(f"{suite}-*/{ORIGIN}")):
-        origin = json.loads(path.read_text())
-        places.add(f"softvt {origin['softvt']} at {origin['commit'] or 'an unknown commit'} on {origin['machine']}")
-        if digest := origin.get("checkpoint_sha256"):
-            weights.append(f"`{path.parent.name}` {digest[:16]}")
-    if not places:
-        return "The runs do not say which version of softvt made them; it was one before 0.2.0.\n\n"
-    return f"Made by {'; '.join(sorted(places))}. Checkpoints (SHA-256): {', '.join(weights)}.\n\n"
+def rates_text(rows: list[dict]) -> str:
+    """The table of rates of the page, in Markdown."""
+    lines = ["| suite | policy | replan | seeds | episodes | Goal, % | Safety, % | D/τ, median |", "|---|---|---|---|---|---|---|---|"]
+    for row in rows:
+        episodes = f"{row['episodes']}" + ("" if row["finished"] else " (interrupted)")
+        goal, safety = (f"{row[key]} [{row[f'{key}_low']}, {row[f'{key}_high']}]" for key in ("goal", "safety"))
+        cells = [f"`{row['suite']}`", row["policy"], row["replan"], row["seeds"], episodes, goal, safety, row["d_over_tau_median"] or "–"]
+        lines.append(f"| {' | '.join(map(str, cells))} |")
+    return "\n".join(lines) + "\n"
 
 
 def _in_common(pair: Pair) -> tuple[list[Run], list[Run]]:
@@ -234,73 +230,78 @@ def _in_common(pair: Pair) -> tuple[list[Run], list[Run]]:
     return common[: len(pair.fewer)], common[len(pair.fewer) :]
 
 
-def _difference(pair: Pair) -> list[str]:
-    """The row of a pair in the table of differences."""
-    policy, (fewer, more) = pair.policy, _in_common(pair)
-    shown = [results.difference(fewer, more, measure).text(signed=True) for measure in MEASURES]
-    succeed, there = "–", "–"
+def _difference(pair: Pair) -> dict:
+    """The row of a pair in the table of differences. *Both succeed*: Safety of the episodes in which both reach the goal."""
+    fewer, more = _in_common(pair)
+    row = pair.columns | {"seeds": len(more), "shift": pair.policy.condition or "none", "episodes": len(more[0].task)}
+    for measure in MEASURES:
+        row |= _interval(measure, results.difference(fewer, more, measure))
+    row |= dict.fromkeys(["both_succeed", "safety_there", "safety_there_low", "safety_there_high"], "")
     # With several seeds, success differs from seed to seed.
     if len(more) == 1:
         both = (fewer[0].goal * more[0].goal).astype(bool)
-        succeed = str(both.sum())
-        there = results.difference([fewer[0].where(both)], [more[0].where(both)], "safety").text(signed=True) if both.any() else "–"
-    names = [f"`{policy.suite}`", pair.difference, policy.code, str(policy.replan), str(len(more)), policy.condition or "none"]
-    return [*names, str(len(more[0].task)), *shown, succeed, there]
+        row["both_succeed"] = int(both.sum())
+        if both.any():
+            row |= _interval("safety_there", results.difference([fewer[0].where(both)], [more[0].where(both)], "safety"))
+    return row
 
 
-def _against_references(learned: dict[Policy, list[Run]], references: dict[tuple[str, str], Run]) -> list[list[str]]:
-    """Rows of the policies less each reference of their suite."""
+def _against_references(learned: dict[Policy, list[Run]], references: dict[tuple[str, str], Run]) -> list[dict]:
+    """Rows of the policies less each reference of their suite, on the episodes that both have."""
     rows = []
     for policy, runs in sorted(learned.items()):
         for name, shown in REFERENCES.items():
             if policy.condition or (policy.suite, name) not in references:
                 continue
             reference, *common = results.in_common([references[policy.suite, name], *runs])
-            found = [results.difference([reference], common, measure).text(signed=True) for measure in ("goal", "safety")]
-            difference = f"{_name(policy)} − {shown}"
-            rows.append([f"`{policy.suite}`", difference, str(policy.replan), str(len(runs)), str(len(reference.task)), *found])
+            row = {"suite": policy.suite, "difference": f"{_name(policy)} − {shown}", "replan": policy.replan, "seeds": len(runs)}
+            row["episodes"] = len(reference.task)
+            for measure in ("goal", "safety"):
+                row |= _interval(measure, results.difference([reference], common, measure))
+            rows.append(row)
     return rows
 
 
-def _by_task(pair: Pair) -> str:
+def _by_task(pair: Pair) -> list[dict]:
+    """Safety by task, on the episodes and seeds that both have."""
     fewer, more = _in_common(pair)
     assets = {task: asset for run in fewer + more for task, asset in run.assets.items()}
 
     def safety(runs: list[Run], task: int) -> str:
         return f"{100 * np.mean([run.safety[run.task == task].mean() for run in runs]):.0f}"
 
-    rows = [
-        [
-            str(task),
-            assets.get(task, "–"),
-            str((more[0].task == task).sum()),
-            safety(fewer, task),
-            safety(more, task),
-        ]
+    return [
+        pair.columns
+        | {"task": task, "asset": assets.get(task, ""), "episodes": (more[0].task == task).sum()}
+        | {"safety_of_first": safety(fewer, task), "safety_of_second": safety(more, task)}
         for task in np.unique(more[0].task)
     ]
-    return _table(["task", "asset", "episodes", *(f"Safety of {name}, %" for name in pair.names)], rows)
 
 
-def _by_stage(pair: Pair) -> str:
+def _by_stage(pair: Pair) -> list[dict]:
+    """Stages in which episodes without success ended, and successes beyond the limit."""
     both = _in_common(pair)
     counts = [Counter(stage for run in runs for stage in run.stage) for runs in both]
     firm = [sum(int(((run.goal == 1) & (run.ratio > 1)).sum()) for run in runs) for runs in both]
-    rows = [[f"failed at *{stage}*", *(str(count[stage]) for count in counts)] for stage in STAGES if any(count[stage] for count in counts)]
-    rows.append(["success beyond the limit", *map(str, firm)])
-    return _table(["episodes", *pair.names], rows)
+    ended = {f"failed at {stage}": [count[stage] for count in counts] for stage in STAGES if any(count[stage] for count in counts)}
+    ended["success beyond the limit"] = firm
+    return [pair.columns | {"episodes": end, "first": first, "second": second} for end, (first, second) in ended.items()]
 
 
-def _shifts(learned: dict[Policy, list[Run]]) -> list[list[str]]:
-    """Rows of the policies under conditions."""
+def _shifts(learned: dict[Policy, list[Run]]) -> list[dict]:
+    """Rows of the policies under conditions, and their change against the same policy without one on the same episodes."""
     rows = []
     for policy, runs in sorted(learned.items()):
         if not policy.condition or policy.condition == UNCHANGED:
             continue
+        row = {"suite": policy.suite, "policy": _name(policy), "replan": policy.replan, "seeds": len(runs), "shift": policy.condition}
+        for measure in ("goal", "safety"):
+            row |= _interval(measure, results.rate(runs, measure))
+        row |= dict.fromkeys(["change_of_safety", "change_of_safety_low", "change_of_safety_high"], "")
         unchanged = learned.get(replace(policy, condition=UNCHANGED), [])
-        change = results.difference(unchanged, runs, "safety").text(signed=True) if len(unchanged) == len(runs) else "–"
-        rates = [results.rate(runs, measure).text() for measure in ("goal", "safety")]
-        rows.append([f"`{policy.suite}`", _name(policy), str(policy.replan), str(len(runs)), policy.condition, *rates, change])
+        if len(unchanged) == len(runs):
+            row |= _interval("change_of_safety", results.difference(unchanged, runs, "safety"))
+        rows.append(row)
     return rows
 
 
@@ -337,7 +338,7 @@ def _row_name(policy: Policy, has_codes: bool) -> str:
 
 
 def write(studies: list[Path], docs: Path) -> None:
-    """Collects studies into DOCS/baselines, and writes the tables into DOCS/baselines.md and the pictures beside the others.
+    """Collects studies into DOCS/baselines, and writes the tables there, the rates into DOCS/baselines.md, and the pictures beside the others.
 
     Raises UserError if the page has no place for the tables.
     """
@@ -348,9 +349,11 @@ def write(studies: list[Path], docs: Path) -> None:
     for study in studies:
         collect(study, folder)
     found = tables(folder)
+    for name, rows in found.items():
+        _write(folder / f"{name}.csv", rows)
     images, shown = docs / "images", plots(folder)
     images.mkdir(parents=True, exist_ok=True)
     (images / "baselines.svg").write_text(figure.rates(shown))
     (images / "baselines_d.svg").write_text(figure.distributions(shown))
     before, after = text.split(BEGIN)[0], text.split(END)[1]
-    page.write_text(f"{before}{BEGIN}\n\n{found}{END}{after}")
+    page.write_text(f"{before}{BEGIN}\n\n{rates_text(found['rates'])}\n{END}{after}")

@@ -9,9 +9,8 @@ import numpy as np
 
 from . import UserError
 
-# File with the outcomes of the episodes of a run that was collected, and its columns.
-OUTCOMES = "outcomes.csv"
-COLUMNS = ["task", "episode", "goal", "no_drop", "safety", "ratio", "stage", "grip"]
+# Columns of the file of a collected run.
+COLUMNS = ["task", "asset", "episode", "goal", "no_drop", "safety", "ratio", "stage", "grip"]
 # Resamples of a bootstrap, and its seed.
 RESAMPLES, SEED = 10_000, 0
 
@@ -30,7 +29,7 @@ class Run:
     ratio: np.ndarray  # (N,) peak D over the limit; infinite if the episode is invalid, NaN if there is no limit
     grip: np.ndarray  # (N,) peak force over the least one that holds; NaN if it is unknown
     stage: list[str]  # stage in which the episode failed, or ""
-    assets: dict[int, str]  # asset of the target by task, as far as the summary has it
+    assets: dict[int, str]  # asset of the target in the first episode of each task
     is_finished: bool = True
 
     def where(self, chosen: np.ndarray) -> "Run":
@@ -46,51 +45,50 @@ def _ratio(row: dict) -> float:
 
 
 def load(folder: Path) -> Run:
-    """Reads a run folder of softvt, which must be finished, or a collected one, whose run may have been interrupted.
-
-    Raises UserError if there is neither.
-    """
-    is_finished = (folder / "summary.json").is_file()
-    if not is_finished and not (folder / OUTCOMES).is_file():
+    """Reads a run folder of softvt. Raises UserError if it is not finished."""
+    if not (folder / "summary.json").is_file():
         raise UserError(f"{folder}: not a finished run: it has no summary.json; repeat its command with --resume")
-    summary = json.loads((folder / "summary.json").read_text()) if is_finished else {}
-    if (folder / OUTCOMES).is_file():
-        with open(folder / OUTCOMES, newline="") as file:
-            rows = list(csv.DictReader(file))
-    else:
-        rows = [json.loads(line) for line in (folder / "episodes.jsonl").read_text().splitlines()]
-        rows = [row | {"ratio": _ratio(row), "stage": row.get("failed_stage") or "", "grip": row.get("grip_ratio")} for row in rows]
-        rows.sort(key=lambda row: (row["task"], row["episode"]))
+    rows = [json.loads(line) for line in (folder / "episodes.jsonl").read_text().splitlines()]
+    rows = [row | {"ratio": _ratio(row), "stage": row.get("failed_stage") or "", "grip": row.get("grip_ratio")} for row in rows]
+    rows.sort(key=lambda row: (row["task"], row["episode"]))
+    return _run(folder.name, json.loads((folder / "summary.json").read_text())["suite"], rows)
 
+
+def load_collected(path: Path, is_finished: bool) -> Run:
+    """Reads the outcomes that `save` wrote. The name of a run begins with that of its suite."""
+    with open(path, newline="") as file:
+        return replace(_run(path.stem, path.stem.split("-")[0], list(csv.DictReader(file))), is_finished=is_finished)
+
+
+def _run(name: str, suite: str, rows: list[dict]) -> Run:
     def column(key: str, kind: type) -> np.ndarray:
         return np.array([kind(row[key]) for row in rows])
 
-    rates = {key: column(key, int).astype(float) for key in ("goal", "no_drop", "safety")}
     return Run(
-        name=folder.name,
-        # An interrupted run has the name of its suite first in its own.
-        suite=summary["suite"] if is_finished else folder.name.split("-")[0],
-        assets={task["task"]: task["asset"] for task in summary.get("by_task", [])},
-        is_finished=is_finished,
+        name=name,
+        suite=suite,
+        assets={int(row["task"]): row["asset"] for row in reversed(rows)},
         task=column("task", int),
         episode=column("episode", int),
         ratio=column("ratio", float),
         grip=np.array([float(row.get("grip") or "nan") for row in rows]),
         stage=[row["stage"] for row in rows],
-        **rates,
+        **{key: column(key, int).astype(float) for key in ("goal", "no_drop", "safety")},
     )
 
 
-def save(run: Run, folder: Path) -> None:
-    """Writes the outcomes of a run into a folder.
+def save(run: Run, path: Path) -> None:
+    """Writes the outcomes of a run.
 
     Ratios are written as they are: one just above 1 is not safe. Files of before have four digits, and 1 may stand for 1.00003 there.
     """
-    with open(folder / OUTCOMES, "w", newline="") as file:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with open(path, "w", newline="") as file:
         table = csv.writer(file, lineterminator="\n")
         table.writerow(COLUMNS)
         for row in zip(run.task, run.episode, run.goal, run.no_drop, run.safety, run.ratio, run.stage, run.grip):
-            table.writerow([*map(int, row[:5]), repr(float(row[5])), row[6], f"{row[7]:.4g}"])
+            task, episode, *outcomes = map(int, row[:5])
+            table.writerow([task, run.assets[task], episode, *outcomes, repr(float(row[5])), row[6], f"{row[7]:.4g}"])
 
 
 @dataclass

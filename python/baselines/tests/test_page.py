@@ -12,6 +12,11 @@ from softvt_baselines import UserError, figure, page
 from test_results import run
 
 
+def chosen(rows: list[dict], *keys: str) -> list[tuple]:
+    """Columns of a table, by row."""
+    return [tuple(row[key] for key in keys) for row in rows]
+
+
 class Pages(unittest.TestCase):
     def setUp(self):
         scratch = tempfile.TemporaryDirectory()
@@ -37,14 +42,13 @@ class Pages(unittest.TestCase):
         page.write([self.study], self.docs)
         text = (self.docs / "baselines.md").read_text()
         self.assertTrue(text.startswith("before\n") and text.endswith("after\n") and "old" not in text)
-        self.assertIn("| VT, continuous | 4 | 2 | 50 | 100.0 [100.0, 100.0] |", text)
-        self.assertIn("| expert (privileged) |  | 1 | 50 | 100.0", text)
-        difference = text.split("### Differences", 1)[1]
+        self.assertIn("| `one` | VT, continuous | 4 | 2 | 50 | 100.0 [100.0, 100.0] |", text)
+        self.assertIn("| `one` | expert (privileged) |  | 1 | 50 | 100.0", text)
+        files = {path.stem: path.read_text() for path in (self.docs / "baselines").glob("*.csv")}
         for pair in ("VP − VO", "VT − VO", "VT − VP", "VPT − VP"):
-            self.assertIn(f"| `one` | {pair} | continuous | 4 | 2 | none | 50 | +0.0 [+0.0, +0.0] |", difference)
-        between, against = difference.split("### Differences from reference controllers")
-        self.assertEqual((between.count("| `one` |"), against.count("| `one` |")), (4, 4))
-        self.assertIn("| `one` | VT, continuous − expert (privileged) | 4 | 2 | 50 | +0.0 [+0.0, +0.0] | -", against)
+            self.assertIn(f"one,{pair},continuous,4,2,none,50,0.0,0.0,0.0,", files["differences"])
+        self.assertEqual((files["differences"].count("\none,"), files["references"].count("\none,")), (4, 4))
+        self.assertIn('one,"VT, continuous − expert (privileged)",4,2,50,0.0,0.0,0.0,-', files["references"])
         drawn = self.pictures(self.docs)
         self.assertIn(">VT: with touch</text>", drawn[0])
         self.assertIn(">expert</text>", drawn[0])
@@ -52,7 +56,7 @@ class Pages(unittest.TestCase):
         page.write([], self.docs)
         self.assertEqual((self.docs / "baselines.md").read_text(), text)
         self.assertEqual(self.pictures(self.docs), drawn)
-        shutil.rmtree(self.docs / "baselines" / "one-vo-continuous-s1-r4")
+        (self.docs / "baselines" / "outcomes" / "one-vo-continuous-s1-r4.csv").unlink()
         page.write([], self.docs)
         self.assertIn(">1 or 2 seeds<", self.pictures(self.docs)[0])
 
@@ -61,30 +65,30 @@ class Pages(unittest.TestCase):
             self.run_of(f"one-{inputs}-continuous-s0-r4/shifts/light x2", np.ones((10, 5), bool))
             self.run_of(f"one-{inputs}-continuous-s0-r4/shifts/reference", np.zeros((10, 5), bool))
         page.collect(self.study, self.docs)
-        text = page.tables(self.docs)
-        self.assertIn("| `one` | VT − VO | continuous | 4 | 1 | light x2 |", text)
-        self.assertNotIn("| reference |", text)
-        self.assertIn("| `one` | VT, continuous | 4 | 1 | light x2 | 100.0 [100.0, 100.0] | 100.0 [100.0, 100.0] | +100.0", text)
+        tables = page.tables(self.docs)
+        self.assertIn(("VT − VO", 1, "light x2"), chosen(tables["differences"], "difference", "seeds", "shift"))
+        self.assertNotIn("reference", [row["shift"] for name in ("differences", "shifts") for row in tables[name]])
+        self.assertIn(("VT, continuous", "light x2", "100.0"), chosen(tables["shifts"], "policy", "shift", "change_of_safety"))
 
     def test_policies_of_two_frames_are_compared_with_each_other_and_with_one(self):
         for inputs in ("vo2", "vt2"):
             self.run_of(f"one-{inputs}-continuous-s0-r4/one", np.ones((10, 5), bool))
         page.collect(self.study, self.docs)
-        text = page.tables(self.docs)
-        self.assertIn("| VT of two frames, continuous | 4 | 1 | 50 | 100.0 [100.0, 100.0] |", text)
+        tables = page.tables(self.docs)
+        self.assertIn(("VT of two frames, continuous", 50, "100.0"), chosen(tables["rates"], "policy", "episodes", "goal"))
         for difference in ("VT of two frames − VO of two frames", "VT of two frames − VT"):
-            self.assertIn(f"| `one` | {difference} | continuous | 4 | 1 | none |", text)
+            self.assertIn((difference, 1), chosen(tables["differences"], "difference", "seeds"))
 
     def test_policies_of_another_teacher_stand_beside_those_of_the_suite(self):
         self.run_of("one-vo-binary-s0-r4/one", np.zeros((10, 5), bool))
         for inputs in ("vo", "vt"):
             self.run_of(f"one-{inputs}-binary-by-expert-binary-s0-r4/one", np.ones((10, 5), bool))
         page.collect(self.study, self.docs)
-        text = page.tables(self.docs)
-        self.assertIn("| VO, binary | 4 | 1 | 50 | 100.0", text)
-        self.assertIn("| VO shown by expert-binary, binary | 4 | 1 | 50 | 100.0 [100.0, 100.0] |", text)
+        tables = page.tables(self.docs)
+        for name in ("VO, binary", "VO shown by expert-binary, binary"):
+            self.assertIn((name, 50, "100.0"), chosen(tables["rates"], "policy", "episodes", "goal"))
         for difference in ("VO shown by expert-binary − VO", "VT shown by expert-binary − VO shown by expert-binary"):
-            self.assertIn(f"| `one` | {difference} | binary | 4 | 1 | none | 50 |", text)
+            self.assertIn((difference, "binary", 50), chosen(tables["differences"], "difference", "code", "episodes"))
         (plot,) = page.plots(self.docs)
         self.assertEqual(list(plot.learned)[:3], ["VO binary", "VO binary*", "VO continuous"])
         self.assertIn(">asterisk:", figure.rates([plot]))
@@ -95,32 +99,34 @@ class Pages(unittest.TestCase):
     def test_policies_are_compared_on_the_seeds_that_both_have(self):
         shutil.rmtree(self.study / "runs" / "one-vo-continuous-s0-r4")
         page.collect(self.study, self.docs)
-        text = page.tables(self.docs)
-        self.assertIn("| VT, continuous | 4 | 2 | 50 |", text)
-        self.assertIn("| `one` | VT − VO | continuous | 4 | 1 | none | 50 |", text)
-        self.assertIn("| `one` | VT − VP | continuous | 4 | 2 | none | 50 |", text)
+        tables = page.tables(self.docs)
+        self.assertIn(("VT, continuous", 2), chosen(tables["rates"], "policy", "seeds"))
+        seeds = chosen(tables["differences"], "difference", "seeds")
+        self.assertTrue(("VT − VO", 1) in seeds and ("VT − VP", 2) in seeds)
 
     def test_an_interrupted_run_that_was_collected_is_compared_on_the_episodes_that_both_have(self):
         page.collect(self.study, self.docs)
-        collected = self.docs / "one-vo-continuous-s0-r4"
-        (collected / "summary.json").unlink()
-        lines = (collected / "outcomes.csv").read_text().splitlines()
-        (collected / "outcomes.csv").write_text("\n".join(lines[:-7]) + "\n")
-        for inputs in ("vp", "vpt"):
-            for seed in range(2):
-                shutil.rmtree(self.docs / f"one-{inputs}-continuous-s{seed}-r4")
-        for inputs in ("vo", "vt"):
-            shutil.rmtree(self.docs / f"one-{inputs}-continuous-s1-r4")
-        text = page.tables(self.docs)
-        self.assertIn("| VO, continuous | 4 | 1 | 43 (interrupted) |", text)
-        self.assertIn("| VT, continuous | 4 | 1 | 50 |", text)
-        self.assertIn("| `one` | VT − VO | continuous | 4 | 1 | none | 43 |", text)
-        self.assertIn("| 8 | – | 3 |", text.split("by task and by stage")[1])
+        collected, runs = self.docs / "outcomes" / "one-vo-continuous-s0-r4.csv", self.docs / "runs.csv"
+        runs.write_text(runs.read_text().replace("one-vo-continuous-s0-r4,1", "one-vo-continuous-s0-r4,0"))
+        lines = collected.read_text().splitlines()
+        collected.write_text("\n".join(lines[:-7]) + "\n")
+        for name in ("vp-continuous-s0", "vpt-continuous-s0", "vo-continuous-s1", "vp-continuous-s1", "vt-continuous-s1", "vpt-continuous-s1"):
+            (self.docs / "outcomes" / f"one-{name}-r4.csv").unlink()
+        tables = page.tables(self.docs)
+        rates = chosen(tables["rates"], "policy", "episodes", "finished")
+        self.assertTrue(("VO, continuous", 43, 0) in rates and ("VT, continuous", 50, 1) in rates)
+        self.assertIn("| 43 (interrupted) |", page.rates_text(tables["rates"]))
+        self.assertIn(("VT − VO", 43), chosen(tables["differences"], "difference", "episodes"))
+        self.assertIn((8, "bun", 3), chosen(tables["tasks"], "task", "asset", "episodes"))
 
     def test_the_published_page_is_that_of_the_published_outcomes(self):
         docs = Path(__file__).parents[3] / "docs"
         published = (docs / "baselines.md").read_text().split(page.BEGIN)[1].split(page.END)[0]
-        self.assertEqual(published.strip(), page.tables(docs / "baselines").strip())
+        tables = page.tables(docs / "baselines")
+        self.assertEqual(published.strip(), page.rates_text(tables["rates"]).strip())
+        for name, rows in tables.items():
+            with self.subTest(table=name):
+                self.assertEqual(page._read(docs / "baselines" / f"{name}.csv"), [{key: str(cell) for key, cell in row.items()} for row in rows])
         plots = page.plots(docs / "baselines")
         self.assertEqual(self.pictures(docs), [figure.rates(plots), figure.distributions(plots)])
 
@@ -153,10 +159,10 @@ class Pages(unittest.TestCase):
         counts = figure._counts(np.array([0.0, 1.0, 1.0001, 400.0]))
         self.assertEqual(np.flatnonzero(counts).tolist(), [0, figure.PER_DECADE - 1, figure.PER_DECADE, len(figure.EDGES) - 2])
 
-    def test_ratios_without_a_limit_and_very_large_ones_have_no_numbers(self):
-        self.assertEqual(page._spread(np.array([np.nan, np.inf])), "–", "an invalid episode of a suite without limits")
-        self.assertEqual(page._spread(np.array([1.0, 2.0, 400.0])), "2.00 [1.10, 89.30]")
-        self.assertEqual(page._spread(np.array([200.0, 300.0])), "> 99 [> 99, > 99]")
+    def test_ratios_without_a_limit_have_no_percentiles(self):
+        columns = page._percentiles("ratio", np.array([np.nan, np.inf]))
+        self.assertEqual(set(columns.values()), {""}, "an invalid episode of a suite without limits")
+        self.assertEqual(page._percentiles("ratio", np.array([1.0, 2.0, np.inf]))["ratio_p95"], "2")
 
     def test_runs_say_where_they_come_from(self):
         origin = {"machine": "a machine", "commit": "abc", "checkpoint_sha256": "0123456789abcdef" * 4}
@@ -164,15 +170,15 @@ class Pages(unittest.TestCase):
         (run / "origin.json").write_text(json.dumps(origin))
         (run / "run.json").write_text(json.dumps({"softvt": "0.2.0"}))
         page.collect(self.study, self.docs)
-        expected = "Made by softvt 0.2.0 at abc on a machine. Checkpoints (SHA-256): `one-vo-continuous-s0-r4` 0123456789abcdef."
-        self.assertIn(expected, page.tables(self.docs))
+        expected = "one-vo-continuous-s0-r4,1,0.2.0,abc,a machine," + "0123456789abcdef" * 4
+        self.assertIn(expected, (self.docs / "runs.csv").read_text())
 
     def test_foreign_runs_are_refused_and_not_collected(self):
         self.run_of("something", np.ones((10, 5), bool))
         with self.assertRaises(UserError) as caught:
             page.write([self.study], self.docs)
         self.assertIn("not named as a run of a study", str(caught.exception))
-        self.assertFalse((self.docs / "baselines" / "something").exists())
+        self.assertFalse((self.docs / "baselines" / "outcomes" / "something.csv").exists())
 
     def test_what_is_missing_is_named(self):
         with self.assertRaises(UserError) as caught:

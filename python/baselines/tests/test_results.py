@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 from softvt_baselines import UserError
-from softvt_baselines.results import difference, load, rate, save
+from softvt_baselines.results import difference, load, load_collected, rate, save
 
 
 def run(folder: Path, safe: np.ndarray, suite: str = "one") -> Path:
@@ -18,6 +18,7 @@ def run(folder: Path, safe: np.ndarray, suite: str = "one") -> Path:
             "suite": suite,
             "policy": folder.name,
             "task": task,
+            "asset": "bun",
             "episode": episode,
             "goal": True,
             "no_drop": True,
@@ -68,8 +69,8 @@ class Results(unittest.TestCase):
         before = load(run(self.folder / "a", np.random.default_rng(3).random((10, 5)) < 0.5))
         before.ratio[:2] = 1.00003, 1 + 1e-12  # just above the limit
         (self.folder / "a" / "episodes.jsonl").unlink()
-        save(before, self.folder / "a")
-        after = load(self.folder / "a")
+        save(before, self.folder / "one-a.csv")
+        after = load_collected(self.folder / "one-a.csv", is_finished=True)
         for key in ("task", "episode", "goal", "no_drop", "safety", "ratio", "stage", "grip"):
             np.testing.assert_array_equal(getattr(before, key), getattr(after, key))
 
