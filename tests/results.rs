@@ -7,39 +7,53 @@ mod tables;
 
 use std::{fs, path::Path};
 
+use collected::{Rate, Row};
 use serde_json::json;
+use softvt::{
+    evaluation::statistics,
+    runs::summary::{SuiteSummary, TaskScores},
+};
 
 /// Root of the repository.
 const ROOT: &str = env!("CARGO_MANIFEST_DIR");
 
 #[test]
-fn the_published_tables_are_those_of_the_summaries() {
+fn the_published_tables_are_those_of_the_rows() {
     let root = Path::new(ROOT);
-    let (results, labels) =
-        (collected::read(root).expect("summaries"), collected::labels(root).expect("labels"));
+    let (rows, labels) = (collected::read(root).expect("rows"), collected::labels(root).expect("labels"));
     let physics = collected::physics(root).expect("a golden state");
     let readme = fs::read_to_string(root.join("README.md")).expect("a README");
     let rates = collected::rates(root).expect("rates");
-    let expected = tables::written(&readme, &results, &labels, &physics, &rates);
-    let expected = expected.expect("a place for the tables");
+    let expected = tables::written(&readme, &rows, &labels, &rates).expect("a place for the tables");
     assert_eq!(readme, expected, "run .ci/regenerate results");
     let page = fs::read_to_string(root.join(tables::PAGE)).expect("a page");
-    assert_eq!(page, tables::page(&results, &labels, &physics), "run .ci/regenerate results");
+    assert_eq!(page, tables::page(&rows, &labels, &physics), "run .ci/regenerate results");
 }
 
 #[test]
 fn the_first_screen_shows_the_best_constant_number() {
-    let cell = |name: &str, safety: f64| {
-        let rate = |rate: f64| json!({ "rate": rate, "wilson95": [rate, rate] });
-        json!({
-            "name": name, "goal_success_rate": rate(90.0), "safety_success_rate": rate(safety), "d_over_tau_median": 1.0,
-        })
+    let row = |name: &str, safety: f64| {
+        let rate = |rate: f64| Rate { rate: Some(rate), wilson95: Some([rate, rate]) };
+        Row {
+            script: "suites/hidden.lua".to_owned(),
+            suite: "object_hidden".to_owned(),
+            controller: name.to_owned(),
+            tasks: 1,
+            episodes: 1,
+            invalid: 0,
+            goal: rate(90.0),
+            no_drop: rate(90.0),
+            safety: rate(safety),
+            d_over_tau: Some(1.0),
+            grip_ratio: None,
+            goal_time_s: None,
+            softvt: String::new(),
+            seed: 0,
+            physics: String::new(),
+        }
     };
-    let controllers =
-        [cell("expert", 99.0), cell("look-retry", 60.0), cell("drives", 30.0), cell("one-force", 40.0)];
-    let suites = vec![json!({ "name": "object_hidden", "controllers": controllers })];
-    let hidden = collected::Results { script: "suites/hidden.lua".to_owned(), has_conditions: false, suites };
-    let table = tables::first_screen(&[hidden], &json!({ "expert": "knows the object" }));
+    let rows = [row("expert", 99.0), row("look-retry", 60.0), row("drives", 30.0), row("one-force", 40.0)];
+    let table = tables::first_screen(&rows, &[("expert".to_owned(), "knows the object".to_owned())].into());
     assert_eq!(
         table,
         "|  | Object-Hidden: Goal % | Safety % |\n|---|---:|---:|\n\
@@ -51,27 +65,21 @@ fn the_first_screen_shows_the_best_constant_number() {
 }
 
 /// Writes a run of `suite` with two episodes, of which one is safe.
-fn run(folder: &Path, script: &str, suite: &str, policy: &str) {
+fn write_run(folder: &Path, script: &str, suite: &str, policy: &str) {
     fs::create_dir_all(folder).expect("a folder");
-    let rate = |rate: f64| json!({ "rate": rate, "wilson95": [rate / 2.0, rate] });
+    let mut summary = SuiteSummary::from_records(suite, policy, &[]);
+    summary.scores.episodes = 2;
+    summary.scores.goal_success_rate = statistics::Rate::new(2, 2);
+    summary.scores.safety_success_rate = statistics::Rate::new(1, 2);
+    let (prompt, asset, scores) = (String::new(), String::new(), summary.scores.clone());
+    summary.by_task.push(TaskScores { task: 0, prompt, asset, scores });
+    let record = |(d, time, grip): (f64, f64, f64)| {
+        json!({ "d_peak": d, "tau": 0.2, "goal_time_s": time, "grip_ratio": grip }).to_string() + "\n"
+    };
     let files = [
         ("run.json", json!({ "softvt": "1", "seed": 3, "script": script, "suite": suite }).to_string()),
-        (
-            "summary.json",
-            json!({
-                "suite": suite, "policy": policy, "privileged": true, "episodes": 2, "invalid": 0, "by_task": [{}],
-                "goal_success_rate": rate(100.0), "no_drop_rate": rate(100.0), "safety_success_rate": rate(50.0),
-            })
-            .to_string(),
-        ),
-        (
-            "episodes.jsonl",
-            [(0.1, 4.0, 1.5), (0.4, 6.0, 2.5)]
-                .map(|(d, time, grip)| {
-                    json!({ "d_peak": d, "tau": 0.2, "goal_time_s": time, "grip_ratio": grip }).to_string() + "\n"
-                })
-                .concat(),
-        ),
+        ("summary.json", serde_json::to_string(&summary).expect("JSON")),
+        ("episodes.jsonl", [(0.1, 4.0, 1.5), (0.4, 6.0, 2.5)].map(record).concat()),
     ];
     for (name, text) in files {
         fs::write(folder.join(name), text).expect("a file");
@@ -79,7 +87,7 @@ fn run(folder: &Path, script: &str, suite: &str, policy: &str) {
 }
 
 #[test]
-fn rows_and_columns_follow_the_runs() {
+fn rows_follow_the_runs_and_replace_earlier_ones() {
     let home = tempfile::tempdir().expect("a folder");
     let root = home.path();
     fs::create_dir_all(root.join("assets")).expect("a folder");
@@ -88,41 +96,29 @@ fn rows_and_columns_follow_the_runs() {
     let suites = ["one_varied", "two"].map(|suite| {
         let rows = [("reference", None), ("size-seen", Some("size-seen"))].map(|(condition, policy)| {
             let folder = format!("{suite}/{condition}");
-            run(&out.join(&folder), "suites/controllers.lua", suite, policy.unwrap_or("expert"));
+            write_run(&out.join(&folder), "suites/controllers.lua", suite, policy.unwrap_or("expert"));
             json!({ "condition": condition, "policy": policy, "outcome": { "folder": folder } })
         });
         json!({ "suite": suite, "rows": rows })
     });
     fs::write(out.join("conditions.json"), json!({ "suites": suites }).to_string()).expect("a file");
+    collected::add(root, &out).expect("runs of conditions");
     for policy in ["expert", "binary"] {
-        run(&root.join(policy).join("one"), "suites/all.lua", "one", policy);
+        write_run(&root.join(policy).join("one"), "suites/all.lua", "one", policy);
         collected::add(root, &root.join(policy)).expect("runs of a list of suites");
     }
     collected::add(root, &out).expect("runs of conditions");
-    // Adding them again replaces them.
-    collected::add(root, &out).expect("runs of conditions");
-    let results = collected::read(root).expect("summaries");
-    let labels = json!({ "size-seen": "sees the size" });
-    let overview = tables::overview(&results, &labels, "abc");
-    assert_eq!(
-        overview,
-        "`softvt suites/controllers.lua --episodes 2`: 2 episodes per row and suite; the brackets are the 95 % interval of Safety. No episode was invalid. \
-         All controllers plan from ground-truth state (*privileged*).\n\n\
-         |  | One-Varied: Goal % | Safety % | Two: Goal % | Safety % |\n|---|---:|---:|---:|---:|\n\
-         | `expert` | 100.0 | 50.0\u{a0}[25.0,\u{a0}50.0] | 100.0 | 50.0\u{a0}[25.0,\u{a0}50.0] |\n\
-         | `size-seen`: sees the size | 100.0 | 50.0\u{a0}[25.0,\u{a0}50.0] | 100.0 | 50.0\u{a0}[25.0,\u{a0}50.0] |\n\n\
-         `softvt suites/all.lua --episodes 2 --policy NAME` for each controller: 2 episodes per row and suite; the brackets are the 95 % interval of Safety. No episode was invalid. All controllers \
-         plan from ground-truth state (*privileged*).\n\n\
-         |  | One: Goal % | Safety % |\n|---|---:|---:|\n\
-         | `expert` | 100.0 | 50.0\u{a0}[25.0,\u{a0}50.0] |\n| `binary` | 100.0 | 50.0\u{a0}[25.0,\u{a0}50.0] |\n"
-    );
-    assert!(
-        tables::overview(&results, &labels, "abcd")
-            .starts_with("Rows that were not run again with this version")
-    );
+    let rows = collected::read(root).expect("rows");
+    let names: Vec<_> = rows.iter().map(|row| (row.suite.as_str(), row.controller.as_str())).collect();
+    let expected = ["expert", "size-seen"].map(|name| [("one_varied", name), ("two", name)]);
+    let [[a, b], [c, d]] = expected;
+    assert_eq!(names, [a, c, b, d, ("one", "expert"), ("one", "binary")]);
     // Medians of D/τ 0.5 and 2, of grip ratios 1.5 and 2.5, and of times 4 and 6 s.
-    let page = tables::page(&results, &labels, "abcd");
-    assert!(page.contains("| 50.0\u{a0}[25.0,\u{a0}50.0] | 1.25 | 2.00 | 5.0 | `abc` |"), "{page}");
+    let page = tables::page(&rows, &[("size-seen".to_owned(), "sees the size".to_owned())].into(), "abcd");
+    let cells = "| 2 | 0 | 100.0\u{a0}[34.2,\u{a0}100.0] | – | 50.0\u{a0}[9.5,\u{a0}90.5] | 1.25 | 2.00 | 5.0 | `abc` |";
+    assert!(page.contains(&format!("| `size-seen`: sees the size {cells}")), "{page}");
+    assert!(page.contains("## `softvt suites/controllers.lua --episodes 2`\n\n### One-Varied\n"), "{page}");
+    assert!(page.contains("## `softvt suites/all.lua --episodes 2 --policy NAME`\n"), "{page}");
     let error = collected::add(root, &root.join("docs")).expect_err("no run");
     assert!(error.contains("no finished run"), "{error}");
 }

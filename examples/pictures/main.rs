@@ -1,6 +1,8 @@
 //! Draws the pictures of `docs/images/` that follow from committed results: `cargo run --release --example pictures`
 
 mod calibration;
+#[path = "../results/collected.rs"]
+mod collected;
 mod results;
 mod validation;
 

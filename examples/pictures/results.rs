@@ -1,15 +1,14 @@
 //! Goal and Safety of the controllers in the hidden suites: two marks with the gap between them.
 
-use std::{fs, path::Path};
+use std::path::Path;
 
-use serde_json::Value;
+use crate::collected::{self, Row};
 use softvt::media::svg::{self, Anchor, Area, at, circle, line, rect, text};
 
 /// The image, from the root of the repository.
 pub const IMAGE: &str = "docs/images/hidden.svg";
-/// Results and words about the controllers.
-const RESULTS: &str = "docs/results/hidden.json";
-const LABELS: &str = "docs/results/labels.json";
+/// Script of the runs.
+const SCRIPT: &str = "suites/hidden.lua";
 /// Sizes, px: the names at the left, a plot with its gap to the next, a row, and the heads and feet of the plots.
 const NAMES: f64 = 322.0;
 const PLOT: f64 = 320.0;
@@ -24,26 +23,28 @@ const FONT_SIZE: f64 = 13.0;
 /// # Errors
 /// Results that cannot be read.
 pub fn svg(root: &Path) -> Result<String, String> {
-    let (results, labels) = (json(root, RESULTS)?, json(root, LABELS)?);
-    let suites = list(&results["suites"]);
-    let names: Vec<&str> = suites.first().map_or_else(Vec::new, |suite| {
-        list(&suite["controllers"]).iter().filter_map(|cell| cell["name"].as_str()).collect()
-    });
+    let (mut rows, labels) = (collected::read(root)?, collected::labels(root)?);
+    rows.retain(|row| row.script == SCRIPT);
+    let mut suites: Vec<&str> = rows.iter().map(|row| row.suite.as_str()).collect();
+    suites.dedup();
+    let names: Vec<&str> = rows
+        .iter()
+        .filter(|row| Some(&row.suite.as_str()) == suites.first())
+        .map(|row| row.controller.as_str())
+        .collect();
     let base = TOP + ROW * names.len() as f64;
     let mut drawn = String::new();
     for (row, name) in names.iter().enumerate() {
-        let label =
-            labels[*name].as_str().map_or_else(|| (*name).to_owned(), |words| format!("{name}: {words}"));
+        let label = labels.get(*name).map_or_else(|| (*name).to_owned(), |words| format!("{name}: {words}"));
         drawn += &text(at(NAMES - 18.0, middle(row) + 4.5), Anchor::End, "", &label);
     }
     for (number, suite) in suites.iter().enumerate() {
         let left = NAMES + number as f64 * (PLOT + GAP);
-        let title = suite["name"].as_str().unwrap_or_default().replace('_', " ");
-        drawn += &text(at(left, 20.0), Anchor::Start, "title", &title);
+        drawn += &text(at(left, 20.0), Anchor::Start, "title", &suite.replace('_', " "));
         drawn += &axis(left, base);
-        for (row, name) in names.iter().enumerate() {
-            let cell = list(&suite["controllers"]).iter().find(|cell| cell["name"] == *name);
-            drawn += &cell.map_or_else(String::new, |cell| dumbbell(left, middle(row), cell));
+        for (place, name) in names.iter().enumerate() {
+            let row = rows.iter().find(|row| row.suite == *suite && row.controller == *name);
+            drawn += &row.map_or_else(String::new, |row| dumbbell(left, middle(place), row));
         }
     }
     let key = base + 42.0;
@@ -79,30 +80,14 @@ fn axis(left: f64, base: f64) -> String {
     ticks.concat()
 }
 
-fn dumbbell(left: f64, y: f64, cell: &Value) -> String {
-    let rate = |field: &str| cell[field]["rate"].as_f64().map(|percent| x(left, percent));
-    let (Some(goal), Some(safety)) = (rate("goal_success_rate"), rate("safety_success_rate")) else {
-        return String::new();
-    };
-    let bounds: Vec<f64> =
-        list(&cell["safety_success_rate"]["wilson95"]).iter().filter_map(Value::as_f64).collect();
-    let band = match bounds[..] {
-        [low, high] => {
-            let (from, to) = (x(left, low), x(left, high));
-            rect(Area { x: from, y: y - 8.0, width: to - from, height: 16.0 }, "band")
-        }
-        _ => String::new(),
-    };
+fn dumbbell(left: f64, y: f64, row: &Row) -> String {
+    let (Some(goal), Some(safety)) = (row.goal.rate, row.safety.rate) else { return String::new() };
+    let (goal, safety) = (x(left, goal), x(left, safety));
+    let band = row.safety.wilson95.map_or_else(String::new, |ends| {
+        let [from, to] = ends.map(|end| x(left, end));
+        rect(Area { x: from, y: y - 8.0, width: to - from, height: 16.0 }, "band")
+    });
     band + &line(at(safety, y), at(goal, y), "over")
         + &circle(at(goal, y), 5.0, "ring")
         + &circle(at(safety, y), 4.5, "dot")
-}
-
-fn list(value: &Value) -> &[Value] {
-    value.as_array().map_or(&[], Vec::as_slice)
-}
-
-fn json(root: &Path, path: &str) -> Result<Value, String> {
-    let text = fs::read_to_string(root.join(path)).map_err(|error| format!("{path}: {error}"))?;
-    serde_json::from_str(&text).map_err(|error| format!("{path}: {error}"))
 }

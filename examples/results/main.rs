@@ -1,10 +1,9 @@
 //! Writes the tables of results: `cargo run --release --example results -- FOLDER...`
 //!
 //! Each folder is the output of `softvt SCRIPT --out FOLDER`: of conditions (`suites/controllers.lua`), of a list of
-//! suites (`suites/all.lua`), or of one suite. The results of its runs replace those of the same suites and controllers
-//! in `docs/results/SCRIPT.json`, which are committed; to drop others, delete that file first. Then the tables in
-//! README.md and `docs/results/README.md` are written anew from these files, also without any folder, and the rates in
-//! README.md from `assets/rates.json`.
+//! suites (`suites/all.lua`), or of one suite. The results of its runs replace those of the same script, suite and
+//! controller in `docs/results/results.jsonl`. Then the table and the rates in README.md and the tables in
+//! `docs/results/README.md` are written anew, also without any folder.
 
 mod collected;
 mod tables;
@@ -17,12 +16,10 @@ fn main() -> Result<(), String> {
     for folder in &folders {
         collected::add(root, Path::new(folder))?;
     }
-    let (results, labels, physics) =
-        (collected::read(root)?, collected::labels(root)?, collected::physics(root)?);
+    let (rows, labels) = (collected::read(root)?, collected::labels(root)?);
     let readme = fs::read_to_string("README.md").map_err(|error| format!("README.md: {error}"))?;
-    let rates = collected::rates(root)?;
-    write("README.md", &tables::written(&readme, &results, &labels, &physics, &rates)?)?;
-    write(tables::PAGE, &tables::page(&results, &labels, &physics))
+    write("README.md", &tables::written(&readme, &rows, &labels, &collected::rates(root)?)?)?;
+    write(tables::PAGE, &tables::page(&rows, &labels, &collected::physics(root)?))
 }
 
 fn write(path: &str, text: &str) -> Result<(), String> {

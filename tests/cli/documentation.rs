@@ -132,7 +132,7 @@ fn the_readmes_suite_and_object_work() {
     project.write("my_suite.lua", text.as_bytes());
     let shown = read("README.md");
     let message = format!("softvt: {}", project.refusal("my_suite.lua"));
-    assert!(shown.contains(&format!("\n{message}\n")), "{message}");
+    assert!(shown.contains(&format!("`{message}`")), "{message}");
 }
 
 #[test]

@@ -110,7 +110,14 @@ class Pages(unittest.TestCase):
         runs.write_text(runs.read_text().replace("one-vo-continuous-s0-r4,1", "one-vo-continuous-s0-r4,0"))
         lines = collected.read_text().splitlines()
         collected.write_text("\n".join(lines[:-7]) + "\n")
-        for name in ("vp-continuous-s0", "vpt-continuous-s0", "vo-continuous-s1", "vp-continuous-s1", "vt-continuous-s1", "vpt-continuous-s1"):
+        for name in (
+            "vp-continuous-s0",
+            "vpt-continuous-s0",
+            "vo-continuous-s1",
+            "vp-continuous-s1",
+            "vt-continuous-s1",
+            "vpt-continuous-s1",
+        ):
             (self.docs / "outcomes" / f"one-{name}-r4.csv").unlink()
         tables = page.tables(self.docs)
         rates = chosen(tables["rates"], "policy", "episodes", "finished")
@@ -126,7 +133,9 @@ class Pages(unittest.TestCase):
         self.assertEqual(published.strip(), page.rates_text(tables["rates"]).strip())
         for name, rows in tables.items():
             with self.subTest(table=name):
-                self.assertEqual(page._read(docs / "baselines" / f"{name}.csv"), [{key: str(cell) for key, cell in row.items()} for row in rows])
+                self.assertEqual(
+                    page._read(docs / "baselines" / f"{name}.csv"), [{key: str(cell) for key, cell in row.items()} for row in rows]
+                )
         plots = page.plots(docs / "baselines")
         self.assertEqual(self.pictures(docs), [figure.rates(plots), figure.distributions(plots)])
 
