@@ -2,12 +2,14 @@
 
 #[path = "../examples/results/collected.rs"]
 mod collected;
+#[path = "../examples/results/rows.rs"]
+mod rows;
 #[path = "../examples/results/tables.rs"]
 mod tables;
 
 use std::{fs, path::Path};
 
-use collected::{Rate, Row};
+use rows::{Rate, Row};
 use serde_json::json;
 use softvt::{
     evaluation::statistics,
@@ -20,14 +22,14 @@ const ROOT: &str = env!("CARGO_MANIFEST_DIR");
 #[test]
 fn the_published_tables_are_those_of_the_rows() {
     let root = Path::new(ROOT);
-    let (rows, labels) = (collected::read(root).expect("rows"), collected::labels(root).expect("labels"));
+    let (table, labels) = (rows::read(root).expect("rows"), rows::labels(root).expect("labels"));
     let physics = collected::physics(root).expect("a golden state");
     let readme = fs::read_to_string(root.join("README.md")).expect("a README");
     let rates = collected::rates(root).expect("rates");
-    let expected = tables::written(&readme, &rows, &labels, &rates).expect("a place for the tables");
+    let expected = tables::written(&readme, &table, &labels, &rates).expect("a place for the tables");
     assert_eq!(readme, expected, "run .ci/regenerate results");
     let page = fs::read_to_string(root.join(tables::PAGE)).expect("a page");
-    assert_eq!(page, tables::page(&rows, &labels, &physics), "run .ci/regenerate results");
+    assert_eq!(page, tables::page(&table, &labels, &physics), "run .ci/regenerate results");
 }
 
 #[test]
@@ -108,13 +110,13 @@ fn rows_follow_the_runs_and_replace_earlier_ones() {
         collected::add(root, &root.join(policy)).expect("runs of a list of suites");
     }
     collected::add(root, &out).expect("runs of conditions");
-    let rows = collected::read(root).expect("rows");
-    let names: Vec<_> = rows.iter().map(|row| (row.suite.as_str(), row.controller.as_str())).collect();
+    let table = rows::read(root).expect("rows");
+    let names: Vec<_> = table.iter().map(|row| (row.suite.as_str(), row.controller.as_str())).collect();
     let expected = ["expert", "size-seen"].map(|name| [("one_varied", name), ("two", name)]);
     let [[a, b], [c, d]] = expected;
     assert_eq!(names, [a, c, b, d, ("one", "expert"), ("one", "binary")]);
     // Medians of D/τ 0.5 and 2, of grip ratios 1.5 and 2.5, and of times 4 and 6 s.
-    let page = tables::page(&rows, &[("size-seen".to_owned(), "sees the size".to_owned())].into(), "abcd");
+    let page = tables::page(&table, &[("size-seen".to_owned(), "sees the size".to_owned())].into(), "abcd");
     let cells = "| 2 | 0 | 100.0\u{a0}[34.2,\u{a0}100.0] | – | 50.0\u{a0}[9.5,\u{a0}90.5] | 1.25 | 2.00 | 5.0 | `abc` |";
     assert!(page.contains(&format!("| `size-seen`: sees the size {cells}")), "{page}");
     assert!(page.contains("## `softvt suites/controllers.lua --episodes 2`\n\n### One-Varied\n"), "{page}");

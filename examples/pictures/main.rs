@@ -1,8 +1,6 @@
 //! Draws the pictures of `docs/images/` that follow from committed results: `cargo run --release --example pictures`
 
 mod calibration;
-#[path = "../results/collected.rs"]
-mod collected;
 mod results;
 mod validation;
 

@@ -1,8 +1,11 @@
 //! Goal and Safety of the controllers in the hidden suites: two marks with the gap between them.
 
+#[path = "../results/rows.rs"]
+mod rows;
+
 use std::path::Path;
 
-use crate::collected::{self, Row};
+use rows::Row;
 use softvt::media::svg::{self, Anchor, Area, at, circle, line, rect, text};
 
 /// The image, from the root of the repository.
@@ -23,11 +26,11 @@ const FONT_SIZE: f64 = 13.0;
 /// # Errors
 /// Results that cannot be read.
 pub fn svg(root: &Path) -> Result<String, String> {
-    let (mut rows, labels) = (collected::read(root)?, collected::labels(root)?);
-    rows.retain(|row| row.script == SCRIPT);
-    let mut suites: Vec<&str> = rows.iter().map(|row| row.suite.as_str()).collect();
+    let (mut shown, labels) = (rows::read(root)?, rows::labels(root)?);
+    shown.retain(|row| row.script == SCRIPT);
+    let mut suites: Vec<&str> = shown.iter().map(|row| row.suite.as_str()).collect();
     suites.dedup();
-    let names: Vec<&str> = rows
+    let names: Vec<&str> = shown
         .iter()
         .filter(|row| Some(&row.suite.as_str()) == suites.first())
         .map(|row| row.controller.as_str())
@@ -43,7 +46,7 @@ pub fn svg(root: &Path) -> Result<String, String> {
         drawn += &text(at(left, 20.0), Anchor::Start, "title", &suite.replace('_', " "));
         drawn += &axis(left, base);
         for (place, name) in names.iter().enumerate() {
-            let row = rows.iter().find(|row| row.suite == *suite && row.controller == *name);
+            let row = shown.iter().find(|row| row.suite == *suite && row.controller == *name);
             drawn += &row.map_or_else(String::new, |row| dumbbell(left, middle(place), row));
         }
     }

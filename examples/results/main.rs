@@ -6,6 +6,7 @@
 //! `docs/results/README.md` are written anew, also without any folder.
 
 mod collected;
+mod rows;
 mod tables;
 
 use std::{fs, path::Path};
@@ -16,10 +17,10 @@ fn main() -> Result<(), String> {
     for folder in &folders {
         collected::add(root, Path::new(folder))?;
     }
-    let (rows, labels) = (collected::read(root)?, collected::labels(root)?);
+    let (table, labels) = (rows::read(root)?, rows::labels(root)?);
     let readme = fs::read_to_string("README.md").map_err(|error| format!("README.md: {error}"))?;
-    write("README.md", &tables::written(&readme, &rows, &labels, &collected::rates(root)?)?)?;
-    write(tables::PAGE, &tables::page(&rows, &labels, &collected::physics(root)?))
+    write("README.md", &tables::written(&readme, &table, &labels, &collected::rates(root)?)?)?;
+    write(tables::PAGE, &tables::page(&table, &labels, &collected::physics(root)?))
 }
 
 fn write(path: &str, text: &str) -> Result<(), String> {

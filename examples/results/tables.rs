@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use serde_json::Value;
 use softvt::runner::PolicyConfig;
 
-use crate::collected::{Rate, Row};
+use crate::rows::{Rate, Row};
 
 /// The file with all columns.
 pub const PAGE: &str = "docs/results/README.md";
@@ -68,18 +68,21 @@ pub fn first_screen(rows: &[Row], labels: &Labels) -> String {
     let of_script: Vec<&Row> = rows.iter().filter(|row| row.script == FIRST_SCRIPT).collect();
     let mut suites: Vec<&str> = of_script.iter().map(|row| row.suite.as_str()).collect();
     suites.dedup();
-    let of_suite = |suite: &str| of_script.iter().copied().filter(move |row| row.suite == suite);
+    let of_suite =
+        |suite: &str| -> Vec<&Row> { of_script.iter().copied().filter(|row| row.suite == suite).collect() };
     let shown = |found: Vec<Option<&Row>>, name: String| {
         line(std::iter::once(name).chain(found.into_iter().flat_map(verdicts)))
     };
     let of = |name: &str| {
-        let found = suites.iter().map(|suite| of_suite(suite).find(|row| row.controller == name));
+        let found = suites.iter().map(|suite| of_suite(suite).into_iter().find(|row| row.controller == name));
         shown(found.collect(), label(labels, name))
     };
     let is_bound =
         |row: &&Row| PolicyConfig::named(&row.controller).is_ok_and(|policy| policy.is_blind_bound());
     let safety = |row: &&Row| row.safety.rate.unwrap_or(-1.0);
-    let best = |suite: &&str| of_suite(suite).filter(is_bound).max_by(|a, b| safety(a).total_cmp(&safety(b)));
+    let best = |suite: &&str| {
+        of_suite(suite).into_iter().filter(is_bound).max_by(|a, b| safety(a).total_cmp(&safety(b)))
+    };
     let best: Vec<Option<&Row>> = suites.iter().map(best).collect();
     let mut names: Vec<String> = best.iter().flatten().map(|row| format!("`{}`", row.controller)).collect();
     names.dedup();
