@@ -243,8 +243,8 @@ fn fit(samples: &[&Sample]) -> Option<[DVector<f64>; 3]> {
     Some([channel(0)?, channel(1)?, channel(2)?])
 }
 
-/// Mean absolute error, of 255, of each fold of images under the fit to the other folds; `fold` maps an index to its
-/// fold.
+/// Mean absolute error, of 255, of each fold of images under the fit to the other folds; `fold` maps an
+/// index to its fold.
 fn held_out_error(presses: &[Vec<Sample>], fold: impl Fn(usize) -> usize) -> f64 {
     let error = |out: usize| {
         let of = |left_out: bool| {

@@ -58,8 +58,8 @@ fn shares(page: &str) -> Vec<f64> {
     summary.lines().filter_map(share).collect()
 }
 
-/// Place of the next dot at a share, px from the left and above the axis: on the pile of its column. The bound is
-/// between two columns.
+/// Place of the next dot at a share, px from the left and above the axis: on the pile of its column. The bound
+/// is between two columns.
 fn pile(share: f64, piles: &mut BTreeMap<i32, usize>) -> Place {
     let offset = (x(share) - x(1.0)) / PITCH;
     let column = if share > 1.0 { offset.floor().max(0.0) } else { (offset.ceil() - 1.0).min(-1.0) };

@@ -21,8 +21,8 @@ pub fn rates(root: &Path) -> Result<Value, String> {
     json_of(&root.join("assets/rates.json"))
 }
 
-/// Adds the runs of a folder, made with the physics of this version. A row replaces the one of the same script, suite
-/// and controller.
+/// Adds the runs of a folder, made with the physics of this version. A row replaces the one of the same
+/// script, suite and controller.
 ///
 /// # Errors
 /// If the folder has no finished run, or a file cannot be read or written.

@@ -91,8 +91,8 @@ impl Journal {
     }
 }
 
-/// The whole lines of a journal that are not empty, each with its number from 1. Text after the last line break was
-/// truncated.
+/// The whole lines of a journal that are not empty, each with its number from 1. Text after the last
+/// line break was truncated.
 pub fn whole_lines(bytes: &[u8]) -> impl Iterator<Item = (usize, &[u8])> {
     let end = bytes.iter().rposition(|byte| *byte == b'\n').unwrap_or(0);
     let lines = bytes[..end].split(|byte| *byte == b'\n').enumerate();

@@ -27,8 +27,8 @@ pub struct SurfaceMesh {
 
 /// Largest number of grid points, which bounds the memory; smaller cells are enlarged to fit.
 const MAX_POINTS: f64 = 2e7;
-/// Edge, in cells, of the largest blocks that are skipped as a whole where they are far from the surface; a power of
-/// two.
+/// Edge, in cells, of the largest blocks that are skipped as a whole where they are far from the surface;
+/// a power of two.
 const BLOCK: usize = 4;
 /// Largest number of passes that make the lattice well composed; a repair may invalidate neighbouring cells.
 const MAX_PASSES: usize = 16;

@@ -25,8 +25,8 @@ softvt_common::settings! {
         /// than the springs relax is released; the value is small compared with `dt`, so that friction does not
         /// lift a sliding surface.
         dissipation_time: f64 = 5e-3, "s", Range::closed(0.0, 1.0);
-        /// Normal contact stiffness per area of nearly rigid colliders, Pa/m: near rigid for Young's moduli up to 1
-        /// MPa.
+        /// Normal contact stiffness per area of nearly rigid colliders, Pa/m: near rigid for Young's moduli
+        /// up to 1 MPa.
         rigid_modulus: f64 = 1e9, "Pa/m", Range::above(0.0, 1e12);
         /// Tangential over normal contact stiffness. Mindlin (1949) gives 0.5 to 0.8 for solids; creep does
         /// not depend on it.

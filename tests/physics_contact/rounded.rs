@@ -133,8 +133,8 @@ fn a_base_carries_however_flat_it_is() {
     }
 }
 
-/// A box of 48 mm whose edges are rounded by `radius` (m), as a mesh: a grid on every face of a cube, moved out from
-/// the core.
+/// A box of 48 mm whose edges are rounded by `radius` (m), as a mesh: a grid on every face of a cube, moved
+/// out from the core.
 fn meshed(radius: f64) -> Shape {
     let (inner, steps) = (0.024 - radius, 8);
     // Along an edge: eight steps of the rounding, the flat, eight steps again.

@@ -78,8 +78,8 @@ pub struct Fall {
     pub expected: f64,
 }
 
-/// Force of pads that cover whole faces of the cube and hold nothing back sideways, N: the bar `E A` in series with the
-/// two contact layers.
+/// Force of pads that cover whole faces of the cube and hold nothing back sideways, N: the bar `E A` in series with
+/// the two contact layers.
 fn covering_force(options: &Squeeze, layer: f64) -> f64 {
     let edge = options.body.width();
     edge * edge * (edge - options.gap) / (edge / options.youngs_pa + 2.0 / layer)

@@ -12,8 +12,8 @@ pub struct Compared {
 }
 
 impl Compared {
-    /// Runs the squeeze of a row. If friction cannot hold, the row's hold columns are those of sticking pads, so the
-    /// pads stick.
+    /// Runs the squeeze of a row. If friction cannot hold, the row's hold columns are those of sticking pads,
+    /// so the pads stick.
     pub fn new(row: Row) -> Self {
         let mut options = row.squeeze();
         if !row.flag("holds") {

@@ -130,9 +130,9 @@ pub enum ImportedImage {
 /// plain. STL files have none.
 ///
 /// # Errors
-/// A file that the mesh file names cannot be read, a material is unknown or states what is not supported, an image has
-/// no texture coordinates, vertices have colours, or there are too many materials; the message names the file or the
-/// material.
+/// A file that the mesh file names cannot be read, a material is unknown or states what is not supported, an
+/// image has no texture coordinates, vertices have colours, or there are too many materials; the message names
+/// the file or the material.
 pub fn import_colours(
     bytes: &[u8],
     format: MeshFormat,
@@ -151,8 +151,8 @@ pub fn import_colours(
 /// Lines, points and curves of OBJ files are ignored. Text is UTF-8, UTF-16 with a byte order mark, or else Latin-1.
 /// A binary STL file whose count of triangles is too small is read to its end.
 ///
-/// [`import_colours`] reads its materials. [`Shape::from_mesh`](super::shape::Shape::from_mesh) turns a closed mesh
-/// into a solid.
+/// [`import_colours`] reads its materials. [`Shape::from_mesh`](super::shape::Shape::from_mesh) turns a closed
+/// mesh into a solid.
 ///
 /// # Errors
 /// If the bytes do not parse, the mesh is empty or larger than the limits, or a coordinate or an index is invalid.

@@ -119,9 +119,9 @@ fn check_material_names(obj: &str, libraries: &[MaterialLibrary]) -> Result<(), 
 /// Name in place of that of `usemtl` without one. No text has it.
 const NO_MATERIAL: &str = "\0";
 
-/// The text of an OBJ file for the crate, which knows keywords in lower case before a space, and lines that neither go
-/// on in the next one nor end in a comment. Lines keep their numbers. Polylines, of which it would make faces, are left
-/// out.
+/// The text of an OBJ file for the crate, which knows keywords in lower case before a space, and lines that
+/// neither go on in the next one nor end in a comment. Lines keep their numbers. Polylines, of which it would make
+/// faces, are left out.
 fn normalised(bytes: &[u8]) -> Result<String, String> {
     let mut text = String::with_capacity(bytes.len());
     let decoded = decoded(bytes)?;

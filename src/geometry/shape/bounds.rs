@@ -10,8 +10,8 @@ use super::{
 };
 use crate::{Aabb, Vec3};
 
-/// Bounds that were found by a search, the most recently used last. Scripts make the same assets anew for every
-/// episode.
+/// Bounds that were found by a search, the most recently used last. Scripts make the same assets
+/// anew for every episode.
 static FOUND: Mutex<Vec<(Shape, Aabb)>> = Mutex::new(Vec::new());
 
 /// Largest number of bounds that are kept.

@@ -65,8 +65,8 @@ fn multiply(k: &[f64; 576], u: &[f64; 24]) -> [f64; 24] {
     p
 }
 
-/// Slopes of an element's positions along each axis: each at the four Gauss positions on the other two axes, the lower
-/// axis first.
+/// Slopes of an element's positions along each axis: each at the four Gauss positions on the other two axes,
+/// the lower axis first.
 ///
 /// A column of F is the slope along one axis: the mean of the four edges in that direction, weighted by the position
 /// of the point across them. So it has only four values per element.

@@ -115,8 +115,8 @@ impl StrainMeter {
         Self { share, limits, collapsed_share: 0.0, damaged_share: 0.0, damaged: vec![0; counted.len()] }
     }
 
-    /// Share of the volume (0..=1) that was beyond the collapse strain in the state of the last update; `None` without
-    /// that limit.
+    /// Share of the volume (0..=1) that was beyond the collapse strain in the state of the last update;
+    /// `None` without that limit.
     pub fn collapsed_share(&self) -> Option<f64> {
         self.limits.collapse.map(|_| self.collapsed_share)
     }

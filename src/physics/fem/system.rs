@@ -15,8 +15,8 @@ use softvt_geometry::{Mat3, Vec3};
 const STALE_ROTATION: f64 = 0.04;
 /// Change of the body's rotation (same norm) beyond which the reduced matrix is rotated again.
 const STALE_FRAME: f64 = 2e-3;
-/// Ratio by which the densification of an element may grow, and by which it may fall, before the matrix is factored
-/// again.
+/// Ratio by which the densification of an element may grow, and by which it may fall, before the
+/// matrix is factored again.
 const STALE_DENSIFICATION: [f64; 2] = [1.2, 0.6];
 /// Curvature of the densification that counts as none in this comparison.
 const SMALL_DENSIFICATION: f64 = 0.05;

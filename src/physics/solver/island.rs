@@ -10,8 +10,8 @@ use softvt_geometry::union_find::UnionFind;
 
 /// Cost of a factorization in Newton steps with an existing factor: constant part, and part per velocity.
 ///
-/// A factorization needs `n³/3` operations, a step reads `n²/2` numbers a few times; measured with 150 to 2000
-/// velocities.
+/// A factorization needs `n³/3` operations, a step reads `n²/2` numbers a few times; measured with
+/// 150 to 2000 velocities.
 const FACTOR_COST_IN_STEPS: [f64; 2] = [5.0, 1.0 / 200.0];
 /// Steps of a pass that refactoring would not avoid.
 const UNAVOIDABLE_STEPS: u32 = 4;

@@ -37,8 +37,8 @@ const MAX_PASSES: usize = 3;
 const PASS_TOLERANCE: f64 = 0.01;
 /// Steps after which the convergence with a stale factor, corrected by those steps, is judged.
 const STALE_FACTOR_TRIAL: u32 = 3;
-/// Velocities from which an island's Hessian is factored in single precision, which is worth it for large matrices
-/// only.
+/// Velocities from which an island's Hessian is factored in single precision, which is worth it
+/// for large matrices only.
 const SINGLE_FROM: usize = 96;
 /// Slope at the end of a line search, relative to that at its start. Points on the line are cheap: they need no product
 /// with the matrices of the blocks.
@@ -541,8 +541,8 @@ mod tests {
     const WEIGHT: f64 = MASS * 9.81 / 60.0;
     const SHEAR: f64 = 5e5 / 60.0;
 
-    /// A light body on a stiff floor that slid to the left and is now pushed to the right with a share of the friction
-    /// bound.
+    /// A light body on a stiff floor that slid to the left and is now pushed to the right with a share
+    /// of the friction bound.
     fn pushed_back(share: f64) -> ContactProblem {
         let (dt, stiffness, left) = (1.0 / 60.0, 1e6, -1e-6);
         let mut weights_a = [0.0; 8];

@@ -32,8 +32,8 @@ impl Real for f32 {}
 
 /// Factors the first `k` columns of the `n × n` matrix `a` (column-major, lower triangle) in place.
 ///
-/// Afterwards those columns hold `L` and the trailing block its Schur complement. The upper triangle is neither read
-/// nor preserved.
+/// Afterwards those columns hold `L` and the trailing block its Schur complement. The upper triangle is
+/// neither read nor preserved.
 ///
 /// # Errors
 /// A pivot is not positive.

@@ -265,8 +265,8 @@ impl World {
         &self.soft[id.index()]
     }
 
-    /// Changes the position (m) and velocity (m/s) of each node of a soft body, both in the world frame. Wakes all
-    /// bodies.
+    /// Changes the position (m) and velocity (m/s) of each node of a soft body, both in the world
+    /// frame. Wakes all bodies.
     pub fn set_soft_motion(&mut self, id: SoftId, mut change: impl FnMut(&mut Vec3, &mut Vec3)) {
         self.wake_all();
         let body = &mut self.soft[id.index()].state;
@@ -290,8 +290,8 @@ impl World {
         &self.articulations[id.index()]
     }
 
-    /// An articulation, to change its state or drives. Wakes all bodies, unless it is driven: a driven one keeps those
-    /// near it awake.
+    /// An articulation, to change its state or drives. Wakes all bodies, unless it is driven: a driven one keeps
+    /// those near it awake.
     pub fn articulation_mut(&mut self, id: ArticulationId) -> &mut Articulation {
         if !self.articulation(id).is_driven() {
             self.wake_all();

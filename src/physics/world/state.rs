@@ -26,8 +26,8 @@ pub struct ContactSummary {
     pub force_w: Vec3,
     /// Sum of the friction bounds μ f_n, N: the largest shear force that the patch can hold.
     pub friction_capacity: f64,
-    /// Force-weighted mean distance slipped since first contact, m. It changes as well when points join or leave the
-    /// patch.
+    /// Force-weighted mean distance slipped since first contact, m. It changes as well when points join
+    /// or leave the patch.
     pub slip_distance: f64,
     /// Force-weighted mean speed at which the points slid in the last step, m/s.
     pub slip_speed: f64,
@@ -113,8 +113,8 @@ pub struct RigidBody {
 }
 
 impl RigidBody {
-    /// True while it sleeps: it is then treated as part of the world until something near it moves or anything is
-    /// changed.
+    /// True while it sleeps: it is then treated as part of the world until something near it moves
+    /// or anything is changed.
     pub fn is_asleep(&self) -> bool {
         self.sleep.is_asleep
     }

@@ -70,8 +70,8 @@ pub struct RenderScene {
     pub(crate) id: u64,
 }
 
-/// The part of a [`WorldSnapshot`](softvt_physics::world::WorldSnapshot) that images depend on. The default has no
-/// moving bodies.
+/// The part of a [`WorldSnapshot`](softvt_physics::world::WorldSnapshot) that images depend on. The default
+/// has no moving bodies.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct FrameView<'a> {
     /// Node positions of each soft body, world, m.
@@ -82,8 +82,8 @@ pub struct FrameView<'a> {
     pub links: &'a [Vec<Pose>],
     /// Pose of the robot's hand, world, for cameras mounted on it.
     pub hand_w: Option<Pose>,
-    /// Albedo at the nodes of each soft body, linear RGB, in place of its materials; those of its materials where it
-    /// is empty.
+    /// Albedo at the nodes of each soft body, linear RGB, in place of its materials; those of its materials
+    /// where it is empty.
     pub node_colours: &'a [Vec<[f32; 3]>],
     /// Segmentation id of objects that are left out of the image, and of the shadows of what moves; 0 for none.
     pub hidden_id: u16,

@@ -125,8 +125,8 @@ fn frame(n: &V3, edge: &V3) -> [V3; 3] {
     [*n, t, n.cross(&t)]
 }
 
-/// A mesh whose vertices are duplicated at creases: one vertex for each smooth group of triangles around each original
-/// vertex.
+/// A mesh whose vertices are duplicated at creases: one vertex for each smooth group of triangles
+/// around each original vertex.
 pub(crate) struct CreasedMesh {
     /// The original vertex of each vertex.
     sources: Vec<u32>,

@@ -31,8 +31,8 @@ use softvt_scene::{Visual, VisualLayer};
 const CELLS: [f64; 9] = [64.0, 50.0, 40.0, 32.0, 26.0, 20.0, 16.0, 12.5, 10.0];
 /// Tolerance of the simplification of shapes, in vertex spacings.
 const SIMPLIFY_TOLERANCE: f32 = 0.05;
-/// Maximum edge of the triangles of a simplified soft shape, in voxels of its body: straight edges follow its
-/// deformation.
+/// Maximum edge of the triangles of a simplified soft shape, in voxels of its body: straight
+/// edges follow its deformation.
 const MAX_SOFT_EDGE: f64 = 1.0 / 3.0;
 /// Maximum edge of triangles with patterns, in longest extents of the mesh.
 const MAX_PATTERN_EDGE: f64 = 1.0 / 48.0;
@@ -51,8 +51,8 @@ const MIN_CELL: f64 = 2e-3;
 /// Share of triangles that may be farther from the surface than the geometric error of their level: a groove, which
 /// takes little of the surface, counts.
 const ERROR_SHARE: f64 = 0.02;
-/// Depth inside a shape from which a vertex belongs to a hidden part of it, m: corners of visible parts are rounded by
-/// less.
+/// Depth inside a shape from which a vertex belongs to a hidden part of it, m: corners of visible parts
+/// are rounded by less.
 const HIDDEN_CORNER_DEPTH: f64 = 3e-4;
 /// Vertices deeper than this inside another solid are invisible, m.
 const HIDDEN_DEPTH: f64 = 1.5e-3;
@@ -142,8 +142,8 @@ impl RenderMesh {
         Self::with_lazy_levels(ShapeSurface::new(name, shape, visuals, None, cache))
     }
 
-    /// Builds the mesh of the shape of a soft body, attached to the nodes of `voxels`, with small triangles on flat
-    /// faces too.
+    /// Builds the mesh of the shape of a soft body, attached to the nodes of `voxels`, with small triangles
+    /// on flat faces too.
     ///
     /// # Errors
     /// As [`RenderMesh::from_shape`]; or part of the surface lies more than two voxels outside `voxels`.
@@ -207,8 +207,8 @@ impl RenderMesh {
         self.levels.coarsest_where(is_good)
     }
 
-    /// The coarsest level that looks like the finest one where a pixel covers `pixel` metres. Soft shapes are not
-    /// simplified.
+    /// The coarsest level that looks like the finest one where a pixel covers `pixel` metres. Soft
+    /// shapes are not simplified.
     pub(crate) fn full_level(&self, pixel: f32) -> Result<&Lod, CameraError> {
         let levels = self.full_levels.as_ref().unwrap_or(&self.levels);
         levels.get(levels.coarsest_where(|lod| lod.is_fine_enough(pixel))?)

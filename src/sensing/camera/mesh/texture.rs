@@ -540,8 +540,8 @@ pub(crate) fn restore_tiles(charts: &[TextureChart], tiles: Vec<PaintedTile>) {
 
 /// Edge of a tile, texels.
 const TILE: usize = 32;
-/// Length of a row of a tile in memory: each tile also has the first row and column of the next ones, so that all
-/// texels have neighbours.
+/// Length of a row of a tile in memory: each tile also has the first row and column of the next ones, so that
+/// all texels have neighbours.
 const TILE_STRIDE: usize = TILE + 1;
 const TILE_TEXELS: usize = TILE_STRIDE * TILE_STRIDE;
 

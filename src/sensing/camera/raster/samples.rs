@@ -45,8 +45,8 @@ const fn chunk_offsets(axis: usize) -> [f32; LANES] {
 /// The samples of a tile. Each keeps the greatest reciprocal depth drawn there and the id of its triangle.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct TileSamples {
-    /// The samples of the colours: row by row, pixel by pixel, each with its four samples; empty if they are not asked
-    /// for.
+    /// The samples of the colours: row by row, pixel by pixel, each with its four samples; empty if they
+    /// are not asked for.
     colours: SamplePlane,
     /// The samples of depth and object at the centres, row by row; empty if they are not asked for.
     centres: SamplePlane,
@@ -155,8 +155,8 @@ impl ChunkPlanes {
 }
 
 impl TriangleSetup {
-    /// Chunks in which a triangle may cover samples, in eight rows from `first` on: the first one, and the end of the
-    /// last one.
+    /// Chunks in which a triangle may cover samples, in eight rows from `first` on: the first one, and the end
+    /// of the last one.
     #[inline(always)]
     fn chunk_spans(&self, first: usize) -> [[i32; LANES]; 2] {
         let y = LANE_INDEX + f32x8::splat(first as f32 + 0.5);

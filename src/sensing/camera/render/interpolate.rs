@@ -73,8 +73,7 @@ impl<'a> TriangleInterpolator<'a> {
         }
     }
 
-    /// Surface points at eight neighbouring pixels, all of which this triangle covers, given the centre of the
-    /// first.
+    /// Surface points at eight neighbouring pixels, all of which this triangle covers, given the centre of the first.
     pub(crate) fn row(&self, lens: &Lens, centre: [f32; 2]) -> RowSamples {
         let w = self.row_weights(lens, centre);
         let attribute = |i: usize| self.attribute(&w, i);
@@ -122,8 +121,8 @@ impl<'a> TriangleInterpolator<'a> {
         a * w[0] + b * w[1] + c * w[2]
     }
 
-    /// Appends the point where the ray through (x, y) meets the triangle, or the point of the triangle that appears
-    /// nearest.
+    /// Appends the point where the ray through (x, y) meets the triangle, or the point of the
+    /// triangle that appears nearest.
     pub(crate) fn push(&self, batch: &mut ShadingBatch<'a>, x: f32, y: f32) {
         let lane = batch.count;
         (batch.x[lane], batch.y[lane]) = (x, y);

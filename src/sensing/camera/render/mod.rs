@@ -76,8 +76,8 @@ impl Renderer {
         self.draw(scene, view, camera, Channels::Colours)
     }
 
-    /// As [`render`](Self::render), several times faster, but with the same depth and segmentation alone: there are no
-    /// colours.
+    /// As [`render`](Self::render), several times faster, but with the same depth and segmentation alone:
+    /// there are no colours.
     ///
     /// # Errors
     /// As [`render`](Self::render).
@@ -247,8 +247,8 @@ fn draw_over_background(
     image
 }
 
-/// Draws the objects that stand still, and the moving ones over them, tile by tile: the background of one tile is kept
-/// at a time.
+/// Draws the objects that stand still, and the moving ones over them, tile by tile: the background of one tile is
+/// kept at a time.
 fn draw_by_tiles(pass: &RenderPass, still_bins: &mut TileBins) -> RenderedImage {
     let mut moving_bins = TileBins::default();
     pass.bin(&[false], still_bins);

@@ -79,8 +79,8 @@ pub(crate) fn is_close(light: &Vec3x8, interpolated: &Vec3x8) -> bool {
     (is_close(|v| v.x) & is_close(|v| v.y) & is_close(|v| v.z)).all()
 }
 
-/// True if no shadow can fall between two rows without touching either; given their columns and rows in the shadow map,
-/// texels.
+/// True if no shadow can fall between two rows without touching either; given their columns and rows in the shadow
+/// map, texels.
 #[inline(always)]
 pub(crate) fn is_near(a: &[f32x8; 2], b: &[f32x8; 2]) -> bool {
     let is_near = |axis: usize| (a[axis] - b[axis]).abs().simd_le(f32x8::splat(MAX_DISTANCE));

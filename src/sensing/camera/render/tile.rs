@@ -117,8 +117,8 @@ pub(crate) trait ShadingSink {
     /// Clears a pixel before its shares are added.
     fn begin_pixel(&mut self, _pixel: usize) {}
 
-    /// Adds radiance under still objects alone to pixels; `surface` are the points that it comes from, `None` for the
-    /// background.
+    /// Adds radiance under still objects alone to pixels; `surface` are the points that it comes from,
+    /// `None` for the background.
     fn add(
         &mut self,
         pass: &RenderPass,
@@ -407,8 +407,8 @@ impl<'a, 'p, S: ShadingSink> TileResolver<'a, 'p, S> {
         }
     }
 
-    /// Writes depth and segmentation of eight pixels from (x, y) on; `ids` are the triangles at their centres, and `w`
-    /// the reciprocal depths.
+    /// Writes depth and segmentation of eight pixels from (x, y) on; `ids` are the triangles at their centres, and
+    /// `w` the reciprocal depths.
     fn write_centres(&mut self, x: usize, y: usize, ids: &[u32; LANES], w: f32x8) {
         let depths = (f32x8::ONE / w).to_array();
         let at = (self.rect.y + y) * self.image.width + self.rect.x + x;

@@ -283,8 +283,8 @@ fn rings(p: Vec3x8, pitch: f32, wobble: f32, spacing: f32, seed: u32) -> f32x8 {
     mean + (ring - mean) * f32x8::splat(fade)
 }
 
-/// Position on a floor in units of its boards' length and width. Each row is shifted along x by a random fraction of
-/// the board length.
+/// Position on a floor in units of its boards' length and width. Each row is shifted along x by a random fraction
+/// of the board length.
 fn board_position(p: &Vec3x8, length: f32, width: f32) -> [f32x8; 2] {
     let y = p.y / f32x8::splat(width);
     let shift = cell_random([cell(y), i32x8::splat(17), i32x8::splat(5)], 1)[0];

@@ -411,8 +411,8 @@ struct Receivers<'a> {
     slope: [[f32; LANES]; 2],
     /// The slope clamped to [`MAX_RECEIVER_SLOPE`], from which heights of occluders are measured.
     clamped_slope: [[f32; LANES]; 2],
-    /// Texels higher than this by more than the rise of the receiver's plane occlude, m; lower ones are the receiver
-    /// itself.
+    /// Texels higher than this by more than the rise of the receiver's plane occlude, m; lower ones
+    /// are the receiver itself.
     limit: [f32; LANES],
     /// Height above level ground, m, from which all texels around a receiver leave it dark.
     dark_height: [f32; LANES],
@@ -511,8 +511,8 @@ impl<'a> Receivers<'a> {
         FilteredLight { visible, radius }
     }
 
-    /// Occluders in a square of half-width `radius`, texels, around receiver `i`, of which every `STEP`th row and
-    /// column is read.
+    /// Occluders in a square of half-width `radius`, texels, around receiver `i`, of which every `STEP`th row
+    /// and column is read.
     ///
     /// They are weighed by the lamp's cone alone, so that the result does not depend on the radius.
     #[inline(always)]
@@ -536,8 +536,8 @@ impl<'a> Receivers<'a> {
         Occluders { weight: sum_lanes(weight), weighted_height: sum_lanes(weighted_height), is_partial }
     }
 
-    /// Share of the light that passes to receiver `i`, by a filter of `radius` texels that reads every `STEP`th row and
-    /// column.
+    /// Share of the light that passes to receiver `i`, by a filter of `radius` texels that reads every
+    /// `STEP`th row and column.
     #[inline(always)]
     fn lit_share<const STEP: usize>(&self, i: usize, radius: f32) -> f32 {
         let window = FilterWindow::<STEP>::new(self, i, radius);

@@ -49,8 +49,8 @@ pub(super) struct LayerKernels {
     pub(super) k: Vec<f32>,
 }
 
-/// Working memory of one thread, and the compliance of the last gel and body; may serve any gel and finger in any
-/// order.
+/// Working memory of one thread, and the compliance of the last gel and body; may serve any gel and
+/// finger in any order.
 #[derive(Clone, Debug, Default)]
 pub struct GelScratch {
     pub(super) spectra: [Vec<Complex32>; 4],

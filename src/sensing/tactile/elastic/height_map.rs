@@ -20,8 +20,8 @@ const MAX_HEIGHT: f64 = 6e-3;
 /// Points of a fine height map per cell of the gel's grid along each axis; odd, so that one is the cell's centre.
 pub(super) const FINE: usize = 3;
 
-/// Height of the lowest surface (m above the apex plane; infinite without one) on the grid of the gel or on one that is
-/// finer.
+/// Height of the lowest surface (m above the apex plane; infinite without one) on the grid of the gel or on
+/// one that is finer.
 #[derive(Clone, Debug, PartialEq)]
 pub(in super::super) struct HeightMap {
     pub(in super::super) columns: usize,
@@ -35,8 +35,8 @@ pub(in super::super) struct HeightMap {
 }
 
 impl HeightMap {
-    /// Height map of `skins` over the pad of `gel`, with `points_per_cell` points per cell of its grid along each axis,
-    /// an odd number.
+    /// Height map of `skins` over the pad of `gel`, with `points_per_cell` points per cell of its grid along each
+    /// axis, an odd number.
     pub(super) fn new(gel: &Gel, skins: &[SkinMesh], points_per_cell: usize) -> Self {
         let (columns, rows) = (points_per_cell * gel.columns, points_per_cell * gel.rows);
         let cell = gel.cell / points_per_cell as f64;

@@ -91,8 +91,8 @@ impl<'a> ShadowCaster<'a> {
         }
     }
 
-    /// Slope above which the horizon of each pixel counts: that of the light, or the slope of the pixel itself over the
-    /// first step.
+    /// Slope above which the horizon of each pixel counts: that of the light, or the slope of the pixel itself
+    /// over the first step.
     fn own_slopes(&self, led: &Led, from: [usize; 2], here: &[f32]) -> Vec<f32> {
         let mut least = vec![led.elevation_tangent; here.len()];
         if let Some(line) = self.line(led, from, STEP, here.len()) {
