@@ -3,7 +3,7 @@
 //! Each folder is the output of `softvt SCRIPT --out FOLDER`: of conditions (`suites/controllers.lua`), of a list of
 //! suites (`suites/all.lua`), or of one suite. The results of its runs replace those of the same script, suite and
 //! controller in `docs/results/results.jsonl`. Then the table and the rates in README.md and the tables in
-//! `docs/results/README.md` are written anew, also without any folder.
+//! `docs/results/README.md` are rewritten, also without any folder.
 
 mod collected;
 mod rows;

@@ -19,7 +19,7 @@ const BELOW_BOUND: [&str; 1] = ["expert-binary"];
 /// Descriptions of the controllers, by name.
 type Labels = BTreeMap<String, String>;
 
-/// The README with its table of verdicts and its rates written anew.
+/// The README with its table of verdicts and its rates updated.
 ///
 /// # Errors
 /// If it does not have the lines around a part once each.
@@ -159,7 +159,7 @@ fn verdicts(row: Option<&Row>) -> [String; 2] {
     row.map_or_else(|| ["–".to_owned(), "–".to_owned()], |row| [number(row.goal.rate, 1), safety(row)])
 }
 
-/// Safety with its interval. Where no object has a limit, Safety does not apply.
+/// Safety with its interval; it does not apply to rigid objects.
 fn safety(row: &Row) -> String {
     if row.d_over_tau.is_none() { "N/A".to_owned() } else { with_interval(&row.safety) }
 }

@@ -3,7 +3,7 @@
 --   expert = knob { joint = "stove.knob", angle = 0.6 }
 --
 -- The fingers grasp the grip of the knob from above and in front, across its faces or its ends, and turn it about its
--- axis as far as the hand keeps clear of the table and of other objects. They then grasp it anew until the joint is at
+-- axis as far as the hand keeps clear of the table and of other objects. They then grasp it again until the joint is at
 -- `angle` (rad, to 0.06). Close to a table a grasp turns by about 40° to either side of upright, and none may lead
 -- further. `speed` (0.6 rad/s) is that of the knob. The part's hints `grip_width_m`, `grip_length_m` and `grip_depth_m`
 -- are the sizes of the grip across, along and in front of the knob; at a joint of 0 it is upright.

@@ -6,7 +6,7 @@
 -- demonstrations do not tell one width per object. The hand closes slowly from before first contact (`closing_speed`,
 -- 0.008 m/s). `stop = "touch"` ends closing by the force on the pads instead of the width of the gels, as does a grasp
 -- that is turned or off-centre because of clearance. `closure` commands one closure instead. `to` places the object
--- beside the target, on the same support: "near", or as seen from the robot "left_of", "right_of", "in_front_of" or
+-- near the target, on the same support: "near", or as seen from the robot "left_of", "right_of", "in_front_of" or
 -- "behind", with `distance` (m) between the centres.
 --
 -- `stack = true` places for stacking: the object is centred again above the target, lowered slowly until it presses
@@ -235,9 +235,9 @@ local function complete(spec)
     refuse("share", ("a share in %g..%g, so that the part is within the window"):format(room, 1 - room))
   end
   if full.stop ~= "width" and full.stop ~= "touch" then refuse("stop", '"width" or "touch"') end
-  if full.distance and not full.to then refuse("distance", "nothing without `to`, which places beside the target") end
+  if full.distance and not full.to then refuse("distance", "nothing without `to`, which places near the target") end
   places.check("pick_place", full, 4)
-  if full.to and full.stack then refuse("stack", "nothing beside `to`, which places beside the target") end
+  if full.to and full.stack then refuse("stack", "nothing with `to`, which places near the target") end
   if full.closing_speed < 1e-4 or full.closing_speed > 0.2 then refuse("closing_speed", "m/s in 0.0001..0.2") end
   return full
 end

@@ -1,4 +1,4 @@
--- Places beside an object, as seen from the robot, which looks along x.
+-- Places near an object, as seen from the robot, which looks along x.
 local frames = require "experts.frames"
 
 local places = {}
@@ -30,7 +30,7 @@ function places.half_extent(object, direction)
 end
 
 -- Raises an error of the expert `name` if the fields `to`, `distance` and `target` of a specification are not a place
--- beside another object; `level` is that of error.
+-- near another object; `level` is that of error.
 function places.check(name, spec, level)
   if spec.target == spec.object then
     error(('%s: target: is "%s", the object itself; name another'):format(name, spec.target), level)
@@ -47,7 +47,7 @@ function places.check(name, spec, level)
   end
 end
 
--- Centre of spec.object at its place beside spec.target, at the present height, or nil and the reason. `spec.to` is
+-- Centre of spec.object at its place near spec.target, at the present height, or nil and the reason. `spec.to` is
 -- "near", on the line between the two, or a direction; `spec.distance` (m) is that between the centres.
 function places.beside(scene, spec)
   local object, target = scene:object(spec.object), places.state(scene, spec.target)

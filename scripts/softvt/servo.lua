@@ -1,6 +1,6 @@
 -- A tactile servo: a hand that feels how firmly it must hold. It closes until both gels touch, lifts until the gels
 -- slide along the object, and tightens while it lifts. The shear of a sliding gel grows with the force; that of a held
--- object is its weight. Where the shear stops growing, the grip is the least one that holds, if the hand can go down a
+-- object is its weight. Once the shear stops growing, the grip is the least one that holds, if the hand can go down a
 -- little and the object stays with it. The hand tightens beyond that grip by a margin, goes back down, closes to it,
 -- and keeps it. Its readings are the markers and its own closure. Its parameters describe gels and markers only, not
 -- the object.

@@ -88,7 +88,7 @@ pub struct CacheKey {
     hash: String,
 }
 
-/// What a folder of a cache contains.
+/// Contents of the folder of a cache.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct CacheUsage {
     /// Number of values.
@@ -119,7 +119,7 @@ impl DiskCache {
         self.0.as_ref().is_some_and(|folder| !lock(&folder.state).has_failed) && code_version().is_some()
     }
 
-    /// Key of a value of this kind; `inputs` is all it depends on beside the code. `None` if nothing is stored.
+    /// Key of a value of this kind; `inputs` is all it depends on except for the code. `None` if nothing is stored.
     pub fn key(&self, kind: &'static str, inputs: &impl Serialize) -> Option<CacheKey> {
         self.0.as_ref()?;
         let code = code_version()?;
@@ -135,7 +135,7 @@ impl DiskCache {
     /// The value of these inputs: a stored one, otherwise that of `compute`, which is stored if that took long.
     ///
     /// # Errors
-    /// Those of `compute`.
+    /// Errors of `compute`.
     pub fn get<V: Serialize + DeserializeOwned, E>(
         &self,
         kind: &'static str,
@@ -154,7 +154,7 @@ impl DiskCache {
         Ok(value)
     }
 
-    /// The stored value of a key. `None` if there is none, or if it is damaged.
+    /// The stored value of a key. `None` without one, or if it is damaged.
     pub fn read<V: DeserializeOwned>(&self, key: &CacheKey) -> Option<V> {
         let folder = self.0.as_ref()?;
         match read_entry(&folder.path, &key.file_name()) {

@@ -63,7 +63,7 @@ impl Setting {
     }
 }
 
-/// What the declaration of a setting says beside its type and default.
+/// Unit, range and documentation of a setting.
 #[derive(Clone, Copy, Debug)]
 pub struct SettingDeclaration<'a> {
     /// Dotted path.

@@ -40,7 +40,7 @@ pub fn cavity(shape: &Shape) -> Option<Aabb> {
     let borders = |cell: &&usize| {
         [**cell - 1, **cell + 1, **cell - nx, **cell + nx, **cell - nx * ny].iter().any(|&next| !free[next])
     };
-    // The largest free ball about a cell reaches to the wall beside it.
+    // The largest free ball about a cell reaches to the nearest wall.
     let balls = cells.filter(borders).map(|&cell| {
         let (centre, radius) = (grid.centre(cell), shape.distance_and_normal(&grid.centre(cell)).0);
         Aabb { min: centre, max: centre }.loosened(radius)

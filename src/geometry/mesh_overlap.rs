@@ -30,7 +30,7 @@ struct Piece {
     rounding: f64,
 }
 
-/// Where a piece lies in another one.
+/// Location of a piece in another one.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Place {
     Inside,
@@ -67,7 +67,7 @@ impl Piece {
         corners.map(|corner| corner + (incentre - corner) * share - depth)
     }
 
-    /// Where this piece lies in another one, from edges just below its surface.
+    /// Location of this piece in another one, from edges just below its surface.
     fn place_in(&self, other: &Self) -> Place {
         let (mut inside, mut outside) = (false, false);
         for triangle in &self.mesh.triangles {
@@ -109,7 +109,7 @@ impl Piece {
         if inside { Place::Inside } else { Place::Outside }
     }
 
-    /// Whether a point is inside; `None` on the surface.
+    /// True if a point is inside; `None` on the surface.
     fn side(&self, p: &Vec3) -> Option<bool> {
         if !self.bounds.loosened(self.rounding).contains(p) {
             return Some(false);

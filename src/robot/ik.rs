@@ -145,7 +145,7 @@ impl DiffIk {
         command
     }
 
-    /// What [`step`](Self::step) would return.
+    /// Result of [`step`](Self::step), without the step.
     pub fn preview(&self, q_now: &ArmAngles, target_b: &Pose) -> ArmAngles {
         let q: Joints = (*q_now).into();
         let last = self.command.unwrap_or(q);

@@ -11,7 +11,7 @@ use crate::scene::*;
 /// Edge of the cubes, m.
 const EDGE: f64 = 0.05;
 
-/// A soft cube at rest on a floor, one at rest on a rigid block, and two fingers beside the first.
+/// A soft cube at rest on a floor, one at rest on a rigid block, and two fingers next to the first.
 struct Still {
     world: World,
     cube: SoftId,
@@ -70,7 +70,7 @@ fn outcomes(act: impl Fn(&mut Still, usize)) -> [[(f64, Vec3); 2]; 2] {
 fn assert_same(what: &str, moved: [bool; 2], act: impl Fn(&mut Still, usize)) {
     let [asleep, awake] = outcomes(act);
     for ((asleep, awake), moved) in asleep.iter().zip(&awake).zip(moved) {
-        // What rests keeps less than a thousandth of a per cent of motion below the speed of sleep.
+        // A body at rest keeps less than a thousandth of a per cent of motion below the speed of sleep.
         assert_eq!(awake.0 > 0.05, moved, "{what}: {awake:?}");
         assert!((asleep.0 - awake.0).abs() < 2e-3 * awake.0.max(1.0), "{what}: {asleep:?} {awake:?}");
         assert!((asleep.1 - awake.1).norm() < 2e-5, "{what}: {asleep:?} {awake:?}");

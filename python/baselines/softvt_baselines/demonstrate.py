@@ -43,7 +43,7 @@ MOST_STEPS = 690
 ROUND = {"steamed_bun", "golden_bun", "sesame_bun", "cylinder", "sphere"}
 # Objects that look alike after a quarter of a turn.
 SQUARE = {"cube"}
-# Displacement of the teacher's grasps in each horizontal direction, m: a hand that feels learns what to do if it is beside the object. The ways of
+# Displacement of the teacher's grasps in each horizontal direction, m: a hand that feels learns what to do if it is next to the object. The ways of
 # the other scenes end in the middle. Control steps of a teacher that only reaches.
 SPREAD, REACHES = 0.003, 90
 # Distance of each gel from an object from which on the teacher closes slowly, m. A policy does not know the size as well as the teacher.

@@ -24,12 +24,12 @@ STYLE = (
     ".safe{fill:var(--safe)}.over{fill:var(--over)}.missed{fill:var(--soft)}path.missed{fill-opacity:.55}rect.safe,rect.over{fill-opacity:.22}"
     ".gap{stroke-width:3}.gap.safe{stroke:var(--safe)}.gap.over{stroke:var(--over)}"
 )
-# Sizes, px: a letter, and where the picture is narrow; the names at the left, a plot, the numbers beside it, and the gap to the next plot; a row
+# Sizes, px: a letter, and where the picture is narrow; the names at the left, a plot, the numbers next to it, and the gap to the next plot; a row
 # of marks or of bars; the head of a plot, the gap below it, the ticks, and a line of the key.
 FONT_SIZE, NARROW_FONT_SIZE, NARROW = 14, 18, 600
 NAMES, PLOT, NUMBERS, GAP, EDGE = 170, 250, 70, 26, 12
 MARKS, BARS, HEAD, FOOT, TICKS, KEY = 27, 40, 40, 14, 36, 28
-# Bars of a distribution of D/τ: their edges, of which one is the limit. What is beyond the axis is at its ends.
+# Bars of a distribution of D/τ: their edges, of which one is the limit. Values beyond the axis are at its ends.
 FIRST, LAST, PER_DECADE = 0.1, 10**1.5, 12
 EDGES = FIRST * 10 ** (np.arange(int(2.5 * PER_DECADE) + 1) / PER_DECADE)
 EDGES[PER_DECADE] = 1  # exactly
@@ -187,7 +187,7 @@ def _text(x: float, y: float, words: str, anchor: str = "start", name: str = "")
 
 
 def _number(left: float, middle: float, words: str, name: str = "") -> str:
-    """A text beside a plot."""
+    """A text next to a plot."""
     return _text(left + PLOT + NUMBERS - 4, middle + 5, words, "end", name)
 
 

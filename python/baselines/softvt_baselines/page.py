@@ -122,7 +122,7 @@ def _grouped(folder: Path) -> tuple[dict[Policy, list[Run]], dict[tuple[str, str
 
 
 def _percentiles(name: str, values: np.ndarray) -> dict[str, str]:
-    """Columns of the 5th, 50th and 95th percentile. Where nothing has a limit, only invalid episodes have a ratio, which is infinite."""
+    """Columns of the 5th, 50th and 95th percentile. Without a limit only invalid episodes have a ratio, which is infinite."""
     names = [f"{name}_p5", f"{name}_median", f"{name}_p95"]
     if not np.isfinite(values).any():
         return dict.fromkeys(names, "")

@@ -45,7 +45,7 @@ SAME = [
 ]
 # Switches of train by the letters of inputs.
 SWITCHES = {"p": ["--drives"], "t": ["--touch", "markers"], "b": ["--touch", "contact"], "i": ["--touch", "pictures"]}
-# File beside the results of a run that says where they come from.
+# File in the folder of a run with the origin of its results.
 ORIGIN = "origin.json"
 
 

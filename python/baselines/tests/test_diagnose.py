@@ -11,7 +11,7 @@ from softvt_baselines.diagnose import BASE, TABLE_BASE, diagnose, meeting
 
 
 def trace(angle: float) -> list[dict]:
-    """A hand that is turned by an angle and meets an object 3 mm beside its middle in step 2."""
+    """A hand that is turned by an angle and meets an object 3 mm off its middle in step 2."""
     place = [0.45 + BASE[0], -0.1 + BASE[1], 0]
     objects = [{"name": "cube", "position_w": place, "quaternion_w": [1, 0, 0, 0]}]
     turn = [float(np.pi * np.cos(angle / 2)), float(np.pi * np.sin(angle / 2)), 0]  # a tool that points down

@@ -240,7 +240,7 @@ class Dataset:
 
 
 def _hdf5_files(path: Path) -> list[Path]:
-    """The HDF5 files of a recording, in order of their names. Raises ValueError if there is none, or if the recording is not complete."""
+    """The HDF5 files of a recording, in order of their names. Raises ValueError without any, or if the recording is not complete."""
     if path.is_file():
         return [path]
     if _is_interrupted(path):
@@ -283,7 +283,7 @@ def _demonstration(file: Path, data: Any, name: str, line: Mapping[str, Any]) ->
 
 
 def _chosen(path: object, recorded: list[Demonstration], suite: str | None, tasks: set[int] | None) -> list[Demonstration]:
-    """The demonstrations of a suite and of tasks. Raises ValueError if there is none, or if tasks of several suites have these numbers."""
+    """The demonstrations of a suite and of tasks. Raises ValueError without any, or if tasks of several suites have these numbers."""
     suites = sorted({demo.suite for demo in recorded})
     if suite is not None and suite not in suites:
         raise ValueError(f"{path}: no demonstration of suite {suite!r}; the recording has those of {', '.join(suites)}")

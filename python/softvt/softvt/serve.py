@@ -377,7 +377,7 @@ def _announced() -> dict[str, list[str]]:
 
 
 def _announce(key: str, server: Server | None) -> None:
-    """Tells later worker processes the address of a server, or that there is none any more."""
+    """Tells later worker processes the address of a server, or that it has ended."""
     known = _announced()
     known.pop(key, None)
     if server is not None:

@@ -403,7 +403,7 @@ class Environments(unittest.TestCase):
         state, info = env.reset(seed=1000)
         self.assertEqual(state.shape, STATE_BOUNDS.shape)
         np.testing.assert_allclose(field(state, "tool_position"), info["state"]["ee_position_b"], atol=1e-6)
-        # The robot of this scene stands on a plate of 12 mm, 0.66 m behind the origin.
+        # The robot of this scene is mounted on a plate of 12 mm, 0.66 m behind the origin.
         left = next(entry for entry in info["state"]["objects"] if entry["name"] == "left")
         expected = np.array(left["position_w"]) - [-0.66, 0.0, 0.012]
         scene = env._client.request("reset", task=3, episode=0)["info"]["scene"]

@@ -238,7 +238,7 @@ fn material_of_mtl(material: tobj::Material) -> Result<ImportedMaterial, String>
     });
     let plain = ImportedMaterial::default();
     let albedo = match (&image, material.diffuse) {
-        // Exporters write a grey beside an image.
+        // Exporters write a grey in addition to an image.
         (Some(_), _) => [1.0; 3],
         (None, Some(colour)) if colour.iter().all(|x| (0.0..=1.0).contains(x)) => colour.map(f64::from),
         (None, Some([r, g, b])) => {

@@ -28,7 +28,7 @@ const MIN_CHECKED_FILL: f64 = 0.2;
 pub struct ContactSampleGroup {
     /// The nodes, of which the first `count` are used.
     pub nodes: [u32; 8],
-    /// How many entries of `nodes` are used.
+    /// Number of used entries of `nodes`.
     pub count: usize,
     /// First sample of the group.
     pub first: usize,

@@ -24,7 +24,7 @@ pub(crate) struct VelocityBlock {
     pub offset: usize,
 }
 
-/// What the velocities of a block describe. Blocks of equal identity and size in two problems describe the same
+/// Meaning of the velocities of a block. Blocks of equal identity and size in two problems describe the same
 /// coordinates, and a factored Hessian is kept from one to the other.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct BlockIdentity {

@@ -13,7 +13,7 @@ struct SecantPair {
     curvature: f64,
 }
 
-/// Number of pairs kept per factor. Their cost is small beside the triangular solves of islands that take many steps.
+/// Number of pairs kept per factor. Their cost is small against the triangular solves of islands that take many steps.
 const MAX_PAIRS: usize = 20;
 
 /// The last pairs.

@@ -19,7 +19,7 @@ mod symbolic;
 pub(crate) use numeric::{BlockMatrix, CholeskyFactor};
 pub(crate) use symbolic::SymbolicFactor;
 
-/// A matrix that has no Cholesky factor. What was computed of the factor must not be used.
+/// A matrix that has no Cholesky factor. The computed part of the factor must not be used.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("the matrix is not positive definite")]
 pub(crate) struct NotPositiveDefinite;

@@ -92,7 +92,7 @@ struct KeptLevel {
     store: Option<TileStore>,
 }
 
-/// Where the painted tiles of a level are stored.
+/// Place of the painted tiles of a level in storage.
 #[derive(Debug)]
 struct TileStore {
     cache: DiskCache,
@@ -311,7 +311,7 @@ struct ShapeSurface {
     /// For error messages.
     name: String,
     material: Arc<SurfaceMaterial>,
-    /// What the vertices hold of each visual: of a textured surface, what textures do not.
+    /// Data of the vertices for each visual; of a textured surface, those that textures do not contain.
     baked: Vec<Visual>,
     is_textured: bool,
     /// Nodes of the soft body that the surface belongs to, if any.

@@ -113,7 +113,7 @@ pub(crate) struct RenderPass<'a> {
     pub(crate) channels: Channels,
 }
 
-/// What is drawn of an image.
+/// Contents of an image.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Channels {
     All,
