@@ -226,8 +226,8 @@ impl CacheFolder {
     }
 }
 
-/// What the values of a key depend on beside their inputs: the code. The executable stands for it, since its version is
-/// the same while it is being changed. `None` if the executable cannot be found.
+/// Version of the code that computes the values, identified by the executable, since the version of the package does
+/// not change with every change of the code. `None` if the executable cannot be found.
 fn code_version() -> Option<&'static str> {
     static VERSION: OnceLock<Option<String>> = OnceLock::new();
     let version = VERSION.get_or_init(|| {
