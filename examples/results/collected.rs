@@ -6,7 +6,7 @@ use std::{
 };
 
 use serde_json::Value;
-use softvt::runs::summary::SuiteSummary;
+use softvt::runs::{record::EpisodeRecord, summary::SuiteSummary};
 
 use crate::rows::{ROWS, Rate, Row, json_of, read};
 
@@ -85,15 +85,14 @@ fn runs(folder: &Path) -> Result<Vec<(PathBuf, Option<String>)>, String> {
 /// The row of a run.
 fn row(folder: &Path, controller: Option<String>, physics: &str) -> Result<Row, String> {
     let manifest: Value = json_of(&folder.join("run.json"))?;
-    let summary: SuiteSummary = json_of(&folder.join("summary.json"))?;
     let path = folder.join("episodes.jsonl");
     let lines = fs::read_to_string(&path).map_err(|error| format!("{}: {error}", path.display()))?;
-    let records: Vec<Value> = lines
+    let records: Vec<EpisodeRecord> = lines
         .lines()
         .map(|line| serde_json::from_str(line).map_err(|error| format!("{}: {error}", path.display())))
         .collect::<Result<_, _>>()?;
-    let ratio = |record: &Value| Some(record["d_peak"].as_f64()? / record["tau"].as_f64()?);
-    let field = |key: &'static str| move |record: &Value| record[key].as_f64();
+    let suite = records.first().map_or("", |record| &record.header.id.suite);
+    let summary = SuiteSummary::from_records(suite, &text(&manifest, "policy", folder)?, &records);
     let rate = |of: softvt::evaluation::statistics::Rate| Rate {
         rate: of.rate.map(rounded),
         wilson95: of.wilson95.map(|ends| ends.map(rounded)),
@@ -107,9 +106,9 @@ fn row(folder: &Path, controller: Option<String>, physics: &str) -> Result<Row, 
         goal: rate(summary.scores.goal_success_rate),
         no_drop: rate(summary.scores.no_drop_rate),
         safety: rate(summary.scores.safety_success_rate),
-        d_over_tau: median(&records, ratio),
-        grip_ratio: median(&records, field("grip_ratio")),
-        goal_time_s: median(&records, field("goal_time_s")),
+        d_over_tau: median(&records, |record| record.verdict.object().ratio()),
+        grip_ratio: median(&records, |record| record.verdict.object().grip_ratio),
+        goal_time_s: median(&records, |record| record.verdict.goal_time_s),
         softvt: text(&manifest, "softvt", folder)?,
         seed: manifest["seed"].as_u64().unwrap_or_default(),
         physics: physics.to_owned(),
@@ -123,7 +122,7 @@ fn rounded(value: f64) -> f64 {
 }
 
 /// Median of a quantity over the records that have it.
-fn median(records: &[Value], value: impl Fn(&Value) -> Option<f64>) -> Option<f64> {
+fn median(records: &[EpisodeRecord], value: fn(&EpisodeRecord) -> Option<f64>) -> Option<f64> {
     let mut found: Vec<f64> = records.iter().filter_map(value).filter(|value| value.is_finite()).collect();
     found.sort_by(f64::total_cmp);
     let middle = found.len() / 2;

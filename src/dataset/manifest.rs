@@ -39,7 +39,7 @@ pub struct ManifestEntry {
     pub asset_name: String,
     /// True if it is safe; false only where `--keep goal` kept an unsafe one.
     pub success: bool,
-    /// Peak D, %; null for a rigid target.
+    /// Largest peak D of a target, %; null for rigid ones.
     pub d_peak: Option<f64>,
     /// Base seed.
     pub seed: u64,
@@ -76,7 +76,7 @@ impl ManifestEntry {
             language: header.prompt.clone(),
             asset_name: header.asset.clone(),
             success: record.verdict.safety,
-            d_peak: record.verdict.d_peak,
+            d_peak: record.d_peak(),
             seed: id.base_seed,
             state_hash: record.stats.state_hash.clone(),
             notes: record.stats.notes.clone(),
@@ -118,4 +118,20 @@ pub fn read(root: &Path) -> Result<Vec<ManifestEntry>, DatasetError> {
             .map_err(|e| DatasetError::content(&path, format!("line {}", i + 1), e.to_string()))
     };
     text.lines().enumerate().map(parse).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use softvt_evaluation::verdict::TargetVerdict;
+
+    #[test]
+    fn a_second_target_that_deformed_more_has_its_peak_in_the_manifest() {
+        let record = include_str!("../../tests/data/episode_record.json");
+        let mut record: EpisodeRecord = serde_json::from_str(record).expect("a valid record");
+        let other = TargetVerdict { soft: true, d_peak: Some(3.0), ..TargetVerdict::default() };
+        record.verdict.targets.push(other);
+        let paths = TaskPaths { root: "d".into(), suite: "suite".to_owned(), task: 0 };
+        assert_eq!(ManifestEntry::new(&paths, 0, &record).d_peak, Some(3.0));
+    }
 }

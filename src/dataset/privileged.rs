@@ -81,7 +81,7 @@ fn deformation(finished: &FinishedEpisode) -> Vec<DataStream> {
         shifted(scores, vec![0.0], |score| vec![pick(score).unwrap_or(f64::NAN)])
     };
     let size = |f: &ControlStepScore| {
-        f.worst.deformation_v1.map_or(vec![f64::NAN; 3], |d| d.bbox_m.iter().copied().collect())
+        f.targets[0].deformation_v1.map_or(vec![f64::NAN; 3], |d| d.bbox_m.iter().copied().collect())
     };
     let percent = |name: &str, metric: &str, numbers| {
         DataStream::f64(format!("privileged/{name}"), &[], numbers)
@@ -90,12 +90,12 @@ fn deformation(finished: &FinishedEpisode) -> Vec<DataStream> {
             .attribute("meaning", "worst over the physics steps of the control step before")
     };
     vec![
-        percent("d", METRIC_ID, of(&|f| Some(f.worst.deformation?.rms_pct))),
-        percent("d_max", METRIC_ID, of(&|f| Some(f.worst.deformation?.max_pct))),
+        percent("d", METRIC_ID, of(&|f| Some(f.targets[0].deformation?.rms_pct))),
+        percent("d_max", METRIC_ID, of(&|f| Some(f.targets[0].deformation?.max_pct))),
         percent(
             "soft_extras/fem_deformation_rms",
             V1_METRIC_ID,
-            of(&|f| Some(f.worst.deformation_v1?.v1_rms_pct)),
+            of(&|f| Some(f.targets[0].deformation_v1?.v1_rms_pct)),
         ),
         DataStream::f64(
             "privileged/soft_extras/fem_bbox_dims",

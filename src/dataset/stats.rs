@@ -72,7 +72,7 @@ pub fn column_statistics(paths: &[impl AsRef<Path>]) -> Result<Vec<ColumnStatist
             for action in actions {
                 columns.iter_mut().zip(action).for_each(|(column, x)| column.push(x));
             }
-            peaks.extend(file.record(demo).ok().and_then(|record| record.verdict.d_peak));
+            peaks.extend(file.record(demo).ok().and_then(|record| record.d_peak()));
             // Missing for rigid targets and without privileged streams.
             if let Ok(d) = file.array(demo, "privileged/d") {
                 soft.extend(d.values);

@@ -39,7 +39,7 @@ impl EpisodeCategory {
     /// The first that applies of: invalid; safe; the goal over the limit; dropped; goal missed; slipped; not judged.
     pub fn new(outcome: &Outcome, verdict: &Verdict) -> Self {
         let v = verdict;
-        let is_over = v.deformation_ok == Some(false) || v.safety_parts(None).targets_ok == Some(false);
+        let is_over = v.targets.iter().any(|target| target.deformation_ok == Some(false));
         match () {
             () if !outcome.is_valid() => Self::Invalid,
             () if v.safety => Self::Safe,

@@ -71,27 +71,6 @@ pub fn and_known(a: Option<bool>, b: Option<bool>) -> Option<bool> {
     }
 }
 
-/// Parts of Safety Success other than the deformation of the object.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct SafetyParts {
-    /// Goal Success.
-    pub goal: bool,
-    /// NoDrop.
-    pub no_drop: bool,
-    /// NoSlip; `None` if it is not required.
-    pub slip_ok: Option<bool>,
-    /// The other targets are within their own limits; true without others, `None` if that is unknown.
-    pub targets_ok: Option<bool>,
-}
-
-impl SafetyParts {
-    /// Safety Success. Unknown deformation of a soft target is not safe; for a rigid target deformation does not apply.
-    pub fn is_safe(&self, is_soft: bool, deformation_ok: Option<bool>) -> bool {
-        let is_handled_well = self.no_drop && self.slip_ok != Some(false) && self.targets_ok == Some(true);
-        self.goal && is_handled_well && (!is_soft || deformation_ok == Some(true))
-    }
-}
-
 /// Safety of an episode at one κ of the sensitivity table.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct KappaVerdict {
@@ -128,22 +107,5 @@ mod tests {
         assert_eq!(peak(Some(0.5), 1).is_within(Some(1.0)), None);
         assert_eq!(peak(Some(0.5), 0).is_within(None), None, "no threshold");
         assert_eq!(peak(Some(1.5), 1).is_within(Some(1.0)), Some(false), "known to be too much");
-        let parts = SafetyParts { goal: true, no_drop: true, slip_ok: None, targets_ok: Some(true) };
-        assert!(!parts.is_safe(true, None));
-    }
-
-    #[test]
-    fn safety_needs_every_part_and_deformation_only_for_soft_objects() {
-        let parts = SafetyParts { goal: true, no_drop: true, slip_ok: None, targets_ok: Some(true) };
-        assert!(parts.is_safe(true, Some(true)));
-        assert!(!SafetyParts { goal: false, ..parts }.is_safe(true, Some(true)));
-        assert!(!SafetyParts { no_drop: false, ..parts }.is_safe(true, Some(true)));
-        assert!(!parts.is_safe(true, Some(false)));
-        assert!(parts.is_safe(false, None));
-        assert!(SafetyParts { slip_ok: Some(true), ..parts }.is_safe(true, Some(true)));
-        assert!(!SafetyParts { slip_ok: Some(false), ..parts }.is_safe(false, None));
-        for targets_ok in [Some(false), None] {
-            assert!(!SafetyParts { targets_ok, ..parts }.is_safe(true, Some(true)), "{targets_ok:?}");
-        }
     }
 }

@@ -4,20 +4,26 @@ use rand_chacha::{
     ChaCha8Rng,
     rand_core::{RngCore, SeedableRng},
 };
-use serde::{Deserialize, Serialize};
+use serde::Serialize;
 
 /// Quantile of the normal distribution for a two-sided 95 % interval.
 pub const Z95: f64 = 1.959_963_984_540_054;
 
 /// Share of episodes with its uncertainty, in percent.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Rate {
+    /// Number of episodes that were counted.
+    #[serde(skip)]
+    pub count: usize,
+    /// Number of episodes; 0 for what was never judged.
+    #[serde(skip)]
+    pub total: usize,
     /// Share, %; null without episodes.
     pub rate: Option<f64>,
     /// 95 % Wilson score interval of the share, %; null without episodes.
     pub wilson95: Option<[f64; 2]>,
     /// 95 % interval of the share by [`stratified_bootstrap`] over tasks, %; absent where it is not computed.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub bootstrap95: Option<[f64; 2]>,
 }
 
@@ -25,12 +31,7 @@ impl Rate {
     /// Rate of `count` in `total`.
     pub fn new(count: usize, total: usize) -> Self {
         let rate = (total > 0).then(|| 100.0 * count as f64 / total as f64);
-        Self { rate, wilson95: wilson95(count, total), bootstrap95: None }
-    }
-
-    /// Number of those counted among the `total` that the rate is of; 0 without a rate.
-    pub fn count(&self, total: usize) -> usize {
-        (0.01 * self.rate.unwrap_or(0.0) * total as f64).round() as usize
+        Self { count, total, rate, wilson95: wilson95(count, total), bootstrap95: None }
     }
 
     /// The rate of what was never judged: null.
@@ -128,7 +129,7 @@ pub fn quantile_by(count: usize, at: impl Fn(usize) -> f64, q: f64) -> Option<f6
 ///
 /// Invalid episodes have no value that could be averaged; they rank above all values, as +∞. A percentile that falls on
 /// one of them is null. All are null without values.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Distribution {
     /// Arithmetic mean of the values.
     pub mean: Option<f64>,
@@ -143,7 +144,7 @@ pub struct Distribution {
     /// Number of invalid episodes, which rank above all values.
     pub invalid: usize,
     /// 95 % interval of the mean by [`stratified_bootstrap`] over tasks; absent where it is not computed.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub bootstrap95: Option<[f64; 2]>,
 }
 

@@ -1,4 +1,6 @@
-//! Property of random runs: every table has the same Goal Success, Safety Success and counts.
+//! Property of random runs: every table has the same Goal Success, Safety Success, counts and deformations.
+
+use std::path::Path;
 
 use proptest::{collection::vec, prelude::*, sample::select};
 use serde_json::{Value, json};
@@ -11,13 +13,14 @@ use crate::{
     styled_text::TerminalFormat,
     tables, terminal,
 };
+use softvt_common::text::decimal;
 use softvt_evaluation::{
     category::EpisodeCategory,
     drop::{DropEvent, DropReason},
     safety::{KAPPAS, KappaVerdict, NOMINAL_KAPPA},
-    statistics::Rate,
+    statistics::{Distribution, Rate},
     thresholds::{AssetThreshold, ThresholdFile},
-    verdict::{InvalidReason, Outcome, TargetVerdict},
+    verdict::{Handling, InvalidReason, Outcome, TargetVerdict},
 };
 use softvt_runs::{
     paired_stats::{PairedComparison, pair_episodes},
@@ -61,15 +64,18 @@ impl Moved {
     }
 
     /// The fields of a target's verdict that the episode decides.
-    fn verdict(&self, object: String, is_valid: bool) -> TargetVerdict {
+    fn verdict(&self, object: Option<String>, is_valid: bool) -> TargetVerdict {
         let of_limit = |x: f64| Some(x).filter(|_| self.is_soft && self.has_limit);
-        TargetVerdict {
-            object,
-            soft: self.is_soft,
+        let handling = Handling {
             no_drop: !self.is_dropped,
             drop: self.is_dropped.then_some(DropEvent { reason: DropReason::FreeFall, time_s: 1.0 }),
             no_slip: self.slip_mm <= ALLOWED_MM,
             slip_mm: self.slip_mm,
+        };
+        TargetVerdict {
+            soft: self.is_soft,
+            handling: object.as_ref().map(|_| handling),
+            object,
             d_peak: self.d_peak.filter(|_| self.is_soft),
             missing_deformation: u64::from(self.is_incomplete),
             kappa: of_limit(NOMINAL_KAPPA),
@@ -111,6 +117,16 @@ impl Played {
         self.soft().next().is_some()
     }
 
+    /// Largest peak D of a target, %, and largest peak D over τ.
+    fn d_peak(&self) -> Option<f64> {
+        self.soft().filter_map(|moved| moved.d_peak).reduce(f64::max).filter(|_| self.is_valid)
+    }
+
+    fn d_over_tau(&self) -> Option<f64> {
+        let known = self.soft().filter(|moved| moved.has_limit).filter_map(|moved| moved.d_peak);
+        known.map(|d| d / (NOMINAL_KAPPA * D_REF)).reduce(f64::max).filter(|_| self.is_valid)
+    }
+
     fn is_judged(&self) -> bool {
         self.soft().all(|moved| match self.is_valid {
             true => moved.is_within(NOMINAL_KAPPA).is_some(),
@@ -121,9 +137,11 @@ impl Played {
     fn record(&self, episode: usize) -> EpisodeRecord {
         let mut record = sample_record();
         record.header.id.episode = episode as u32;
-        let verdict = |(at, moved): (usize, &Moved)| moved.verdict(format!("object {at}"), self.is_valid);
+        let name = |at: usize| (at > 0).then(|| format!("object {at}"));
+        let verdict = |(at, moved): (usize, &Moved)| moved.verdict(name(at), self.is_valid);
         let mut targets: Vec<TargetVerdict> = self.moved.iter().enumerate().map(verdict).collect();
-        let object = targets.remove(0);
+        let object = &mut targets[0];
+        (object.d_peak_v1, object.d_peak_max) = (object.d_peak, object.d_peak);
         record.header.soft = object.soft;
         record.outcome = match (self.is_valid, self.reaches_goal) {
             (true, true) => Outcome::Completed,
@@ -143,15 +161,11 @@ impl Played {
         v.drop = (!v.no_drop).then_some(DropEvent { reason: DropReason::FreeFall, time_s: 1.0 });
         (v.slip_mm, v.no_slip) = (self.slip_mm(), self.slip_mm() <= ALLOWED_MM);
         v.slip_ok = Some(v.no_slip).filter(|_| self.requires_no_slip && self.is_valid);
-        (v.d_peak, v.d_peak_v1, v.d_peak_max) = (object.d_peak, object.d_peak, object.d_peak);
-        (v.kappa, v.tau, v.d_ref) = (object.kappa, object.tau, object.d_ref);
-        (v.deformation_ok, v.missing_deformation) = (object.deformation_ok, object.missing_deformation);
         v.safety = self.is_safe(NOMINAL_KAPPA);
         let known = |moved: &Moved| moved.is_within(NOMINAL_KAPPA);
-        let (object, others) = (&self.moved[0], &self.moved[1..]);
-        let is_harm_known = others.iter().any(|other| known(other) == Some(false));
-        let are_others_known = is_harm_known || others.iter().all(|other| known(other).is_some());
-        v.safety_known = self.is_valid && known(object).is_some() && are_others_known;
+        let is_harm_known = self.moved.iter().any(|moved| known(moved) == Some(false));
+        v.safety_known =
+            self.is_valid && (is_harm_known || self.moved.iter().all(|moved| known(moved).is_some()));
         v.targets = targets;
         record.check().expect("a record that the judge could write");
         record
@@ -231,6 +245,19 @@ proptest! {
             }
         }
 
+        // Peaks of D: all of them, those over τ, and the table of the report.
+        let peaks = |of: fn(&Played) -> Option<f64>| episodes.iter().filter_map(of).collect::<Vec<f64>>();
+        let invalid = count(&|episode| !episode.is_valid && episode.is_soft());
+        let expected = Distribution::with_invalid(peaks(Played::d_peak), invalid);
+        prop_assert_eq!(Distribution { bootstrap95: None, ..scores.deformation }, expected);
+        prop_assert_eq!(scores.d_over_tau, Distribution::from_values(peaks(Played::d_over_tau)));
+        let table = tables::deformation_table(&runs);
+        prop_assert_eq!(table.is_some(), is_soft);
+        if let Some(table) = table {
+            let cells = [decimal(expected.mean, 2), expected.n.to_string(), expected.invalid.to_string()];
+            prop_assert_eq!([&table.rows[0][2], &table.rows[0][6], &table.rows[0][7]], cells.each_ref());
+        }
+
         // Strictness: the summary, and the figure of the report.
         let corners = page::strictness::curve_corners(run);
         prop_assert_eq!((run.summary.kappa.is_empty(), corners.is_empty()), (!is_soft, !is_judged));
@@ -253,18 +280,33 @@ proptest! {
         let cell = |count: Option<usize>| count.map_or_else(|| "N/A".to_owned(), |c| tables::rate(&Rate::new(c, n)));
         prop_assert_eq!([&row[3], &row[5]], [&cell(Some(goal)), &cell(shown_safety.map(|_| safe))]);
 
+        // The page: Goal and Safety, and the number of episodes of each category.
+        let html = page::page(&runs, &page::Thumbnails::new(), Path::new("page"));
+        let row = html.split("<td class=\"number\" data-head=\"Goal, %\">").nth(1).expect("a row of the run");
+        prop_assert!(row.starts_with(&decimal(Some(percent(goal)), 0)), "{}", row);
+        let shown = shown_safety.map_or_else(|| "N/A".to_owned(), |safety| format!("<b>{safety:.0}"));
+        let cell = row.split("data-head=\"Safety, %\">").nth(1).expect("Safety of the run");
+        prop_assert!(cell.starts_with(&shown), "{}", cell);
+        let counted = cell.split("class=\"counts\">").nth(1).expect("counts of the run");
+        let counted = counted.split("</td>").next().unwrap_or_default();
+        for (category, count) in &scores.categories {
+            let shown = format!("{} {count}", category.glyph());
+            prop_assert!(counted.contains(&shown), "{} in {}", shown, counted);
+        }
+
         // The table of conditions, the comparison with itself, and the row of a leaderboard.
         let condition = ConditionOutcome::new("a".into(), &records, None);
         prop_assert_eq!((condition.episodes, condition.invalid), (n, scores.invalid));
         prop_assert_eq!(condition.goal_success_rate.rate, Some(percent(goal)));
-        prop_assert_eq!(condition.safety_success_rate.rate, shown_safety);
+        prop_assert_eq!((condition.safety_success_rate.rate, condition.d_over_tau), (shown_safety, scores.d_over_tau));
         let paired = PairedComparison::from_pairs(&pair_episodes(&records, &records));
         let rounded = |rate: Option<f64>| rate.map(|rate| (1e9 * rate).round());
         prop_assert_eq!((paired.pairs, rounded(paired.goal.first)), (n, rounded(Some(percent(goal)))));
         prop_assert!(!is_all_soft || rounded(paired.safety.first) == rounded(safety));
         let row: Value = serde_json::from_str(leaderboard::rows(&runs).trim_end()).unwrap();
-        let expected = (json!(n), json!(percent(goal)), json!(safety));
-        prop_assert_eq!((row["episodes"].clone(), row["goal"]["rate"].clone(), row["safety"]["rate"].clone()), expected);
+        let expected = [json!(n), json!(percent(goal)), json!(safety), json!(expected.median)];
+        let found = [&row["episodes"], &row["goal"]["rate"], &row["safety"]["rate"], &row["d_peak_median"]];
+        prop_assert_eq!(found, expected.each_ref());
 
         // SoftVTBench knows one object, no drop, no slip and no missing step.
         let alone = |episode: &&Played| episode.moved.len() == 1 && !episode.moved[0].is_incomplete;

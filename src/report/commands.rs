@@ -5,7 +5,7 @@ use std::path::Path;
 use super::stored_run::StoredRun;
 use softvt_common::episode_id::EpisodeId;
 use softvt_evaluation::category::EpisodeCategory;
-use softvt_runs::{paired_stats::d_over_tau, record::EpisodeRecord};
+use softvt_runs::record::EpisodeRecord;
 
 /// The command that renders an episode.
 pub fn view_command(run: &StoredRun, id: &EpisodeId) -> String {
@@ -56,7 +56,7 @@ pub fn next_commands(run: &StoredRun) -> Vec<String> {
 /// The episode farthest over its limit, or another one that failed; `None` if none failed.
 fn worst_episode(records: &[EpisodeRecord]) -> Option<&EpisodeRecord> {
     let of = |category: EpisodeCategory| records.iter().filter(move |record| record.category() == category);
-    let ratio = |record: &EpisodeRecord| d_over_tau(record).unwrap_or(0.0);
+    let ratio = |record: &EpisodeRecord| record.d_over_tau().unwrap_or(0.0);
     let over = of(EpisodeCategory::OverLimit).max_by(|a, b| ratio(a).total_cmp(&ratio(b)));
     over.or_else(|| EpisodeCategory::ALL.into_iter().skip(1).find_map(|category| of(category).next()))
 }
@@ -108,8 +108,8 @@ mod tests {
     fn the_next_commands_are_the_report_and_the_episode_farthest_over_the_limit() {
         let record = |episode: u32, d: f64| {
             let mut record = sample_record();
-            (record.header.id.episode, record.verdict.d_peak) = (episode, Some(d));
-            (record.verdict.deformation_ok, record.verdict.safety) = (Some(d <= 1.0), d <= 1.0);
+            (record.header.id.episode, record.verdict.object_mut().d_peak) = (episode, Some(d));
+            (record.verdict.object_mut().deformation_ok, record.verdict.safety) = (Some(d <= 1.0), d <= 1.0);
             record
         };
         let run = stored("runs/a", "noop", vec![record(0, 1.5), record(1, 9.0), record(2, 0.5)]);

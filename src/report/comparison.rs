@@ -597,9 +597,10 @@ mod tests {
             record.header.id.episode = episode as u32;
             let v = &mut record.verdict;
             (v.goal, v.failed_stage) = (failed_stage.is_none(), failed_stage);
-            (v.d_mean, v.d_final, v.d_p95) = (Some(d_mean), Some(0.1), Some(0.3));
-            (v.time_over_tau_s, v.others_ok) = (Some(0.5), Some(true));
-            (v.grip_ratio, v.gentle) = (Some(10.0 * d_mean), d_mean < 0.3);
+            (v.others_ok, v.gentle) = (Some(true), d_mean < 0.3);
+            let of = v.object_mut();
+            (of.d_mean, of.d_final, of.d_p95) = (Some(d_mean), Some(0.1), Some(0.3));
+            (of.time_over_tau_s, of.grip_ratio) = (Some(0.5), Some(10.0 * d_mean));
             record
         };
         stored(dir, "pi", stages.into_iter().enumerate().map(record).collect())

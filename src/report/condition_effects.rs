@@ -11,7 +11,7 @@ use super::{
 };
 use softvt_evaluation::statistics::{Distribution, Rate};
 use softvt_runs::{
-    paired_stats::{EpisodePair, PairedComparison, PairedDifference, d_over_tau, pair_episodes},
+    paired_stats::{EpisodePair, PairedComparison, PairedDifference, pair_episodes},
     record::EpisodeRecord,
     summary::GroupScores,
 };
@@ -80,7 +80,7 @@ fn effects_of_group(group: &[&RunSummary]) -> Option<ConditionEffects> {
             change,
             goal: scores.goal_success_rate,
             safety: scores.soft_safety_rate(),
-            d_over_tau: pairs.iter().filter_map(|pair| d_over_tau(pair.second)).collect(),
+            d_over_tau: pairs.iter().filter_map(|pair| pair.second.d_over_tau()).collect(),
             differences: PairedComparison::from_pairs(&pairs),
         });
         for EpisodePair { first, second } in pairs {
@@ -109,7 +109,7 @@ fn effects_of_group(group: &[&RunSummary]) -> Option<ConditionEffects> {
         reference: TrendPoint {
             value: None,
             safety: reference.summary.scores.soft_safety_rate(),
-            d_over_tau: reference_records.iter().filter_map(d_over_tau).collect(),
+            d_over_tau: reference_records.iter().filter_map(EpisodeRecord::d_over_tau).collect(),
         },
         mean_goal: mean(|record| record.verdict.goal),
         mean_safety: match effects.iter().any(|effect| effect.differences.safety.n > 0) {

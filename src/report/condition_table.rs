@@ -1,6 +1,6 @@
 //! Results of a suite under several conditions: the rows of `conditions.json`, and their plain-text table.
 
-use serde::{Deserialize, Serialize};
+use serde::Serialize;
 
 use super::{
     comparison::{self, signed},
@@ -17,7 +17,7 @@ use softvt_runs::{
 };
 
 /// Results under one condition.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ConditionOutcome {
     /// Its run folder, relative to that of all conditions.
     pub folder: String,
@@ -59,7 +59,7 @@ impl ConditionOutcome {
 }
 
 /// One condition of a suite.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ConditionRow {
     /// Name of the condition.
     pub condition: String,
@@ -70,10 +70,10 @@ pub struct ConditionRow {
     /// Changed settings by path and value.
     pub set: Vec<(String, String)>,
     /// Policy in place of that of the reference; absent for the same.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub policy: Option<String>,
     /// True if the policy keeps one number constant, by what shows of an object.
-    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
     pub blind: bool,
     /// Null if the condition could have no effect and was not run.
     pub outcome: Option<ConditionOutcome>,
@@ -82,7 +82,7 @@ pub struct ConditionRow {
 }
 
 /// A suite under all conditions, the reference first.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ConditionTable {
     /// Name of the suite in results.
     pub suite: String,
@@ -271,7 +271,7 @@ mod tests {
     fn the_table_has_one_row_per_condition_and_at_most_100_columns() {
         let reference = [sample_record()];
         let mut worse = sample_record();
-        (worse.verdict.safety, worse.verdict.d_peak) = (false, Some(1.5));
+        (worse.verdict.safety, worse.verdict.object_mut().d_peak) = (false, Some(1.5));
         let suite = ConditionTable {
             suite: "buns".into(),
             policy: "expert".into(),

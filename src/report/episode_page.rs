@@ -16,7 +16,7 @@ use softvt_common::{
     files::{self, FileError},
     text::escape_control,
 };
-use softvt_evaluation::stage::TaskStage;
+use softvt_evaluation::{stage::TaskStage, verdict::TargetVerdict};
 use softvt_rollout::StateRecording;
 use softvt_runs::record::EpisodeRecord;
 
@@ -63,7 +63,7 @@ const STYLE_OF_SEVERAL: &str =
 /// Least D over τ that two decimals show.
 const SMALLEST_RATIO: f64 = 0.005;
 
-/// When the deformation of the target was largest, and when it passed its limit.
+/// When the deformation of a target was largest, and when one first passed its limit.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct DeformationTimes {
     /// Time of the largest D, s.
@@ -74,10 +74,9 @@ pub struct DeformationTimes {
 
 impl DeformationTimes {
     /// Those of a recorded episode.
-    pub fn new(record: &EpisodeRecord, states: &StateRecording) -> Self {
+    pub fn new(states: &StateRecording) -> Self {
         let time_s = |state: usize| state as f64 * CONTROL_DT;
-        let is_above = |d: &Option<f64>| d.zip(record.verdict.tau).is_some_and(|(d, tau)| d > tau);
-        let passed = states.worst_d_pct.iter().position(is_above);
+        let passed = states.deformation.iter().position(|of| of.is_some_and(|of| of.is_over()));
         let passed = passed.map(|state| (time_s(state), states.stages.get(state).copied().flatten()));
         Self { worst_s: time_s(worst_state(states)), passed }
     }
@@ -86,16 +85,10 @@ impl DeformationTimes {
 /// What was seen in an episode, and why it failed: "✗ over the limit: D 1.93 % = 5.14 × limit at 4.95 s; above the
 /// limit from 4.20 s, in the stage place".
 pub fn sentence(record: &EpisodeRecord, times: &DeformationTimes) -> String {
-    let worst_s = times.worst_s;
-    let d = match (record.most_deformed(), record.verdict.d_peak) {
-        // An object that was hardly touched is not described by its D.
-        (Some(target), _) if target.ratio() < Some(SMALLEST_RATIO) => String::new(),
-        // The time is that of the object of the task.
-        (Some(target), _) if target.object.is_some() => format!(": {target}"),
-        (Some(target), _) => format!(": {target} at {worst_s:.2} s"),
-        (None, Some(d)) => format!(": D {d:.2} % at {worst_s:.2} s"),
-        (None, None) => String::new(),
-    };
+    // An object that was hardly touched is not described by its D.
+    let is_touched = |target: &TargetVerdict| target.ratio() >= Some(SMALLEST_RATIO);
+    let d = record.deformation_in_words().filter(|_| record.verdict.most_deformed().is_none_or(is_touched));
+    let d = d.map_or_else(String::new, |d| format!(": {d} at {:.2} s", times.worst_s));
     let collapsed = record.crushed_volume_pct().map(|pct| format!(", {pct:.0} % of the volume collapsed"));
     let seen = format!(
         "{} {}{d}{}",
@@ -254,7 +247,8 @@ mod tests {
         let mut record = sample_record();
         let at = |worst_s: f64| DeformationTimes { worst_s, passed: None };
         assert_eq!(sentence(&record, &at(2.0)), "● safe: D 0.33 % = 0.33 × limit at 2.00 s");
-        (record.verdict.d_peak, record.verdict.deformation_ok) = (Some(5.1), Some(false));
+        (record.verdict.object_mut().d_peak, record.verdict.object_mut().deformation_ok) =
+            (Some(5.1), Some(false));
         record.verdict.safety = false;
         assert_eq!(sentence(&record, &at(4.95)), "✗ over the limit: D 5.10 % = 5.10 × limit at 4.95 s");
     }
@@ -262,7 +256,8 @@ mod tests {
     #[test]
     fn the_sentence_says_why_an_episode_failed_and_when_d_passed_the_limit() {
         let mut record = sample_record();
-        (record.verdict.d_peak, record.verdict.deformation_ok) = (Some(5.1), Some(false));
+        (record.verdict.object_mut().d_peak, record.verdict.object_mut().deformation_ok) =
+            (Some(5.1), Some(false));
         record.verdict.safety = false;
         let times = DeformationTimes { worst_s: 4.95, passed: Some((4.2, Some(TaskStage::Place))) };
         let text = sentence(&record, &times);

@@ -96,8 +96,11 @@ mod tests {
         fs::create_dir_all(dir.join("video/task_000")).unwrap();
         fs::write(dir.join("video/task_000/episode_00000.mp4"), b"a video").unwrap();
         let mut record = sample_record();
-        (record.verdict.safety, record.verdict.d_peak, record.verdict.deformation_ok) =
-            (false, Some(1.5), Some(false));
+        (
+            record.verdict.safety,
+            record.verdict.object_mut().d_peak,
+            record.verdict.object_mut().deformation_ok,
+        ) = (false, Some(1.5), Some(false));
         let runs = summarize_runs(vec![stored(&dir.display().to_string(), "noop", vec![record])]);
         let out = root.path().join("new/folder");
         write(&runs, &Thumbnails::new(), &out).unwrap();

@@ -70,9 +70,10 @@ fn contradiction(run: &StatedRun, record: &EpisodeRecord) -> Option<String> {
     if is_valid && (s.time_s - expected_s).abs() > ROUNDING {
         return Some(format!("time_s is {}, and {} steps take {expected_s} s", s.time_s, s.steps));
     }
-    if let Some(tau) = nominal_tau(manifest, record).filter(|tau| v.tau.is_some_and(|own| differ(own, *tau)))
+    if let Some(tau) =
+        nominal_tau(manifest, record).filter(|tau| v.object().tau.is_some_and(|own| differ(own, *tau)))
     {
-        let own = v.tau.unwrap_or_default();
+        let own = v.object().tau.unwrap_or_default();
         return Some(format!("tau is {own}, and that of {} in the run {tau}", record.header.asset));
     }
     let criteria = run.criteria.as_ref()?;
@@ -88,7 +89,7 @@ fn contradiction(run: &StatedRun, record: &EpisodeRecord) -> Option<String> {
         let is_null = if v.slip_ok.is_none() { "null" } else { "not null" };
         return Some(format!("slip_ok is {is_null}, and criteria.require_no_slip of the run {required}"));
     }
-    let ratio = v.grip_ratio.unwrap_or(f64::INFINITY);
+    let ratio = v.object().grip_ratio.unwrap_or(f64::INFINITY);
     let is_gentle = v.goal && ratio <= criteria.gentle_ratio;
     if v.gentle != is_gentle && differ(ratio, criteria.gentle_ratio) {
         return Some(format!("gentle is {}, and goal is {}, grip_ratio {ratio}", !is_gentle, v.goal));
@@ -155,7 +156,7 @@ mod tests {
         };
         let manifest = json!({
             "privileged": record.header.privileged, "settings": { "criteria": criteria },
-            "thresholds": { &record.header.asset: record.verdict.tau },
+            "thresholds": { &record.header.asset: record.verdict.object().tau },
         });
         assert_eq!(contradiction(&manifest, &record), None);
         assert_eq!(contradiction(&json!({}), &record), None, "a manifest without settings");
@@ -190,9 +191,9 @@ mod tests {
         assert!(of(&|r| r.stats.steps += 5).contains("steps take"));
         assert!(of(&|r| r.header.replayed = true).starts_with("replayed is true"));
         assert!(of(&|r| r.header.privileged = !r.header.privileged).starts_with("privileged is"));
-        let of_gentle = of(&|r| (r.verdict.gentle, r.verdict.grip_ratio) = (true, Some(9.0)));
+        let of_gentle = of(&|r| (r.verdict.gentle, r.verdict.object_mut().grip_ratio) = (true, Some(9.0)));
         assert!(of_gentle.contains("gentle is true"), "{of_gentle}");
-        let limit = of(&|r| r.verdict.tau = r.verdict.tau.map(|tau| 100.0 * tau));
+        let limit = of(&|r| r.verdict.object_mut().tau = r.verdict.object().tau.map(|tau| 100.0 * tau));
         assert!(limit.starts_with("tau is 100, and that of"), "{limit}");
     }
 }

@@ -6,7 +6,7 @@ use super::{comparison::difference_warnings, stored_run::StoredRun};
 use softvt_common::text::decimal;
 use softvt_evaluation::{drop::DropReason, verdict::Outcome};
 use softvt_runs::{
-    record::{EpisodeRecord, SoftTarget},
+    record::EpisodeRecord,
     summary::{MethodMarks, SuiteSummary},
 };
 
@@ -141,9 +141,10 @@ pub fn unsafe_reason(record: &EpisodeRecord) -> Option<String> {
         return None;
     }
     let mut parts = failures(record);
-    for SoftTarget { object, d_peak, tau, .. } in record.soft_targets() {
+    for target in record.soft_targets() {
+        let object = target.object.as_deref();
         let name = object.map(|object| format!("{object}: ")).unwrap_or_default();
-        match (d_peak, tau) {
+        match (target.d_peak, target.tau) {
             (Some(d), Some(tau)) if d > tau => parts.push(format!("{name}D {d:.2} % is above τ {tau:.2} %")),
             (_, None) => parts.push(format!("{} has no threshold", object.unwrap_or("the object"))),
             _ => {}
@@ -256,7 +257,7 @@ pub(super) mod tests {
         let mut record = sample_record();
         assert_eq!(unsafe_reason(&record), None);
         record.verdict.safety = false;
-        record.verdict.d_peak = Some(2.5);
+        record.verdict.object_mut().d_peak = Some(2.5);
         assert_eq!(unsafe_reason(&record).unwrap(), "D 2.50 % is above τ 1.00 %");
         (record.verdict.slip_ok, record.verdict.slip_mm) = (Some(false), 3.21);
         assert!(unsafe_reason(&record).unwrap().ends_with("; it slipped by 3.2 mm in the hand"));

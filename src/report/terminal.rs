@@ -130,8 +130,7 @@ fn push_tasks(text: &mut StyledText, summary: &SuiteSummary, format: TerminalFor
     let room = format.width.saturating_sub(1 + NUMBERS_WIDTH + CATEGORIES_WIDTH + wide);
     let name_width = room.clamp(12, 40);
     let row = |number: &str, name: &str, scores: &GroupScores| {
-        let GroupScores { episodes: n, goal_success_rate, .. } = scores;
-        let goal = goal_success_rate.count(*n);
+        let (n, goal) = (scores.episodes, scores.goal_success_rate.count);
         let is_judged = scores.is_soft() && scores.safety_success_rate.rate.is_some();
         let safe =
             if is_judged { format!("{}/{n}", scores.count(EpisodeCategory::Safe)) } else { "N/A".to_owned() };
@@ -289,7 +288,7 @@ fn resolution(scores: &GroupScores) -> String {
     let rate = if scores.is_soft() { scores.safety_success_rate } else { scores.goal_success_rate };
     let n = scores.episodes;
     let wide = if n < FEW_EPISODES { format!("n = {n}: intervals are wide; ") } else { String::new() };
-    match DetectableDifference::new(rate.count(n), n) {
+    match DetectableDifference::new(rate.count, n) {
         Some(DetectableDifference { smallest, .. }) => {
             let (episodes, points) = (counted(n, "episode"), significant(smallest, 2));
             format!("{wide}{episodes} distinguish policies that differ by at least {points} points")
@@ -323,7 +322,7 @@ fn command_notes(commands: &CommandCounts) -> Vec<String> {
 mod tests {
     use super::*;
     use crate::sample_record;
-    use softvt_evaluation::verdict::Outcome;
+    use softvt_evaluation::verdict::{Outcome, TargetVerdict};
     use softvt_runs::record::{EpisodeRecord, UnreachableCommand};
 
     fn episode(task: usize, prompt: &str, edit: impl Fn(&mut EpisodeRecord)) -> EpisodeRecord {
@@ -340,8 +339,8 @@ mod tests {
         vec![
             episode(0, left, |_| ()),
             episode(0, left, |r| {
-                r.verdict.d_peak = Some(1.5);
-                (r.verdict.deformation_ok, r.verdict.safety) = (Some(false), false);
+                r.verdict.object_mut().d_peak = Some(1.5);
+                (r.verdict.object_mut().deformation_ok, r.verdict.safety) = (Some(false), false);
             }),
             episode(1, right, |r| r.outcome = Outcome::Error { message: "x".into() }),
         ]
@@ -386,8 +385,8 @@ mod tests {
     #[test]
     fn an_object_is_called_crushed_from_5_percent_of_collapsed_volume_on() {
         let crushed = episode(0, "put it there", |r| {
-            (r.verdict.deformation_ok, r.verdict.safety) = (Some(false), false);
-            r.verdict.collapsed_volume_pct = Some(67.0);
+            (r.verdict.object_mut().deformation_ok, r.verdict.safety) = (Some(false), false);
+            r.verdict.object_mut().collapsed_volume_pct = Some(67.0);
         });
         let text = plain(&SuiteSummary::from_records("suite", "expert", &[crushed]));
         assert!(text.contains("gap 100 points: placed, but crushed\n"), "{text}");
@@ -420,7 +419,7 @@ mod tests {
     fn the_grip_is_summarised_and_a_required_criterion_is_named() {
         let records = [(1.5, true), (6.0, false)].map(|(ratio, gentle)| {
             episode(0, "put it there", |r| {
-                (r.verdict.grip_ratio, r.verdict.gentle) = (Some(ratio), gentle);
+                (r.verdict.object_mut().grip_ratio, r.verdict.gentle) = (Some(ratio), gentle);
                 (r.verdict.contact_success, r.verdict.contact_safety) = (true, gentle);
                 r.verdict.slip_ok = Some(true);
             })
@@ -442,7 +441,11 @@ mod tests {
     #[test]
     fn what_was_never_judged_has_no_rate_and_no_tau() {
         let unknown = episode(0, "put it there", |r| {
-            (r.verdict.tau, r.verdict.d_ref, r.verdict.deformation_ok) = (None, None, None);
+            (
+                r.verdict.object_mut().tau,
+                r.verdict.object_mut().d_ref,
+                r.verdict.object_mut().deformation_ok,
+            ) = (None, None, None);
             (r.verdict.safety, r.verdict.safety_known) = (false, false);
         });
         let text = plain(&SuiteSummary::from_records("suite", "expert", &[unknown]));
@@ -454,7 +457,7 @@ mod tests {
 
     #[test]
     fn the_column_of_tau_shows_what_was_applied() {
-        let tau = |tau: Option<f64>| episode(0, "put it there", |r| r.verdict.tau = tau);
+        let tau = |tau: Option<f64>| episode(0, "put it there", |r| r.verdict.object_mut().tau = tau);
         let shown = |records: &[EpisodeRecord]| {
             tau_range(SuiteSummary::from_records("suite", "expert", records).scores.tau_range)
         };
@@ -465,10 +468,7 @@ mod tests {
 
     #[test]
     fn a_rigid_suite_shows_not_applicable() {
-        let rigid = episode(0, "lift it", |r| {
-            r.header.soft = false;
-            (r.verdict.d_peak, r.verdict.deformation_ok, r.verdict.tau) = (None, None, None);
-        });
+        let rigid = episode(0, "lift it", |r| r.verdict.targets = vec![TargetVerdict::default()]);
         let text = plain(&SuiteSummary::from_records("suite", "expert", &[rigid]));
         assert!(text.contains("Safety  N/A  rigid objects") && !text.contains('κ'), "{text}");
         assert!(text.contains("● 1 placed without a drop") && !text.contains("safe:"), "{text}");

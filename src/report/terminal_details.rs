@@ -19,7 +19,7 @@ pub(super) fn push_details(text: &mut StyledText, summary: &SuiteSummary) {
     push_grip(text, scores);
     push_deformation(text, summary);
     push_harm_and_stages(text, scores);
-    let safe = scores.safety_success_rate.count(scores.episodes);
+    let safe = scores.safety_success_rate.count;
     if let Some(DetectableDifference { smallest, found }) = DetectableDifference::new(safe, scores.episodes) {
         let [smallest, found] = [smallest, found].map(|points| significant(points, 2));
         let found = format!("{smallest} points; in 4 of 5 cases {found}");

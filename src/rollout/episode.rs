@@ -17,7 +17,7 @@ use super::{
     robot_instance::ArmCommand,
     sensor_assets::{SensingError, SensorAssets},
     sensor_noise::SensorSeed,
-    sensors::{Sensors, StateRecording, check_sensors},
+    sensors::{Sensors, StateDeformation, StateRecording, check_sensors},
     simulation::{Simulation, placed_at, state_hash},
     trace::StepTrace,
 };
@@ -461,6 +461,11 @@ impl Episode {
         self.target
     }
 
+    /// The objects that the task moves, in the order of the verdict's targets.
+    pub fn targets(&self) -> &[usize] {
+        &self.evidence.goal().targets
+    }
+
     /// The last action; `None` before the first.
     pub fn last_action(&self) -> Option<&Action> {
         self.actions.last()
@@ -644,11 +649,16 @@ impl Episode {
             let joint_torques = states.iter().map(|state| state.joint_torques).collect();
             let stages = states.iter().map(|state| state.stage).collect();
             let frames = states.into_iter().map(|state| state.frame).collect();
-            let settled = reference.as_ref().map(|_| 0.0);
-            let worst = scores.iter().map(|score| score.worst.deformation.map(|d| d.rms_pct));
-            let worst_d_pct = std::iter::once(settled).chain(worst).collect();
+            let targets = &record.verdict.targets;
+            let settled = targets.iter().map(|target| (target.soft.then_some(0.0), target.tau));
+            let in_step = |score: &ControlStepScore| {
+                let d_pct = score.targets.iter().map(|worst| worst.deformation.map(|d| d.rms_pct));
+                StateDeformation::worst(d_pct.zip(targets.iter().map(|target| target.tau)))
+            };
+            let settled = StateDeformation::worst(settled);
+            let deformation = std::iter::once(settled).chain(scores.iter().map(in_step)).collect();
             let (sensors, target) = (self.sensors, self.target);
-            StateRecording { sensors, frames, joint_torques, target, worst_d_pct, stages }
+            StateRecording { sensors, frames, joint_torques, target, deformation, stages }
         });
         let (actions, mut joint_commands) = (self.actions, self.joint_commands);
         let last = joint_commands.last().copied().unwrap_or_else(|| self.sim.robot.q(&self.sim.world));

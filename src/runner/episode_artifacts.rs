@@ -107,7 +107,7 @@ impl EpisodeArtifacts<'_> {
             }
         }
         let (actions_path, trace_path) = (actions::path(self.dir, index), self.trace_path(index));
-        let needs_nodes = self.trace == Some(TraceDetail::Nodes) && record.header.soft;
+        let needs_nodes = self.trace == Some(TraceDetail::Nodes) && record.has_soft_target();
         let is_intact = |path: &PathBuf| match path {
             path if *path == actions_path => self.has_actions(record),
             path if *path == trace_path && needs_nodes => has_nodes(path),
@@ -182,7 +182,7 @@ fn has_nodes(path: &Path) -> bool {
 fn debug_frames(finished: &FinishedEpisode) -> Vec<DebugFrame> {
     let header = &finished.record.header;
     let frame = |(step, score): (usize, &ControlStepScore)| {
-        let (d, reference) = (score.worst.deformation_v1.as_ref(), finished.reference.as_ref());
+        let (d, reference) = (score.targets[0].deformation_v1.as_ref(), finished.reference.as_ref());
         let (rms, max, bbox) = (d.map(|d| d.v1_rms_pct), d.map(|d| d.max_pct), d.map(|d| d.bbox_m));
         let shape = DebugShape::new(&header.asset, reference, rms, max, bbox);
         DebugFrame::new(&header.id, step as u32, score.success_now, shape)
@@ -199,10 +199,10 @@ fn debug_frames(finished: &FinishedEpisode) -> Vec<DebugFrame> {
 fn aborted_frame(finished: &FinishedEpisode, step: usize) -> DebugFrame {
     let (header, verdict) = (&finished.record.header, &finished.record.verdict);
     let before =
-        finished.scores.iter().filter_map(|score| Some(score.worst.deformation_v1.as_ref()?.v1_rms_pct));
+        finished.scores.iter().filter_map(|score| Some(score.targets[0].deformation_v1.as_ref()?.v1_rms_pct));
     let before = before.fold(0.0, f64::max);
-    let peak = verdict.d_peak_v1.filter(|peak| *peak > before);
+    let peak = verdict.object().d_peak_v1.filter(|peak| *peak > before);
     let reference = finished.reference.as_ref();
-    let shape = DebugShape::new(&header.asset, reference, peak, verdict.d_peak_max, None);
+    let shape = DebugShape::new(&header.asset, reference, peak, verdict.object().d_peak_max, None);
     DebugFrame::new(&header.id, step as u32, false, shape)
 }

@@ -391,11 +391,7 @@ pub(crate) fn episode_line(record: &EpisodeRecord) -> String {
             parts => format!(" ({})", parts.join(", ")),
         },
     };
-    let d = match (record.most_deformed(), verdict.d_peak) {
-        (Some(target), _) => format!(", {target}"),
-        (None, Some(d)) => format!(", D {d:.2} %"),
-        (None, None) => String::new(),
-    };
+    let d = record.deformation_in_words().map(|d| format!(", {d}")).unwrap_or_default();
     let outcome = format!("{} {name}{reason}{d}", category.glyph());
     let stats = &record.stats;
     let mut line = format!("{}: {outcome}, {:.1} s simulated", record.header.id.index(), stats.time_s);

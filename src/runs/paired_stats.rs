@@ -6,7 +6,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use serde::{Deserialize, Serialize};
+use serde::Serialize;
 
 use super::{
     paired_tests::{e_value, mcnemar, signed_rank},
@@ -66,16 +66,10 @@ pub fn group_by_task<'p, 'a>(pairs: &'p [EpisodePair<'a>]) -> impl Iterator<Item
     })
 }
 
-/// Largest peak D over τ of the objects that the goal moves, of a valid episode; `None` without a limit or a
-/// measurement.
-pub fn d_over_tau(record: &EpisodeRecord) -> Option<f64> {
-    record.most_deformed().filter(|_| record.outcome.is_valid())?.ratio()
-}
-
 /// Differences of the second run from the first. An invalid episode succeeds at nothing and has no deformation.
 ///
 /// A quantity is compared over the pairs in which both episodes have it.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct PairedComparison {
     /// Number of episodes that both runs have.
     pub pairs: usize,
@@ -120,7 +114,7 @@ pub struct PairedComparison {
     /// Peak D over τ where both runs have both.
     pub d_over_tau: PairedDifference,
     /// Metrics of the suite that both runs have, by name.
-    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     pub metrics: BTreeMap<String, PairedDifference>,
 }
 
@@ -175,7 +169,7 @@ impl PairedComparison {
             contact_success: rate(|r| r.verdict.contact_success),
             contact_safety: safety_rate(|r| r.verdict.contact_safety),
             gentle: rate(|r| r.verdict.gentle),
-            grip_ratio: mean(|r| r.verdict.grip_ratio),
+            grip_ratio: mean(|r| r.verdict.object().grip_ratio),
             others_ok: PairedDifference::from_successes(
                 pairs
                     .iter()
@@ -188,20 +182,20 @@ impl PairedComparison {
             failed_stages: PairedStages::new(
                 pairs.iter().map(|pair| [pair.first, pair.second].map(|r| r.verdict.failed_stage)),
             ),
-            d_mean: mean(|r| r.verdict.d_mean),
-            d_final: mean(|r| r.verdict.d_final),
-            d_p95: mean(|r| r.verdict.d_p95),
+            d_mean: mean(|r| r.verdict.object().d_mean),
+            d_final: mean(|r| r.verdict.object().d_final),
+            d_p95: mean(|r| r.verdict.object().d_p95),
             collapsed_volume_pct: mean(EpisodeRecord::collapsed_volume_pct),
             damaged_volume_pct: mean(EpisodeRecord::damaged_volume_pct),
             d_peak: mean(EpisodeRecord::d_peak),
-            d_over_tau: mean(d_over_tau),
+            d_over_tau: mean(EpisodeRecord::d_over_tau),
             metrics: names.into_iter().map(|name| (name.clone(), of_metric(name))).collect(),
         }
     }
 }
 
 /// Stages at which the same episodes of two runs failed.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct PairedStages {
     /// Number of episodes in which both runs recorded stages.
     pub n: usize,
@@ -252,7 +246,7 @@ impl PairedStages {
 /// let [low, high] = safety.interval95.expect("episodes");
 /// assert!(low > 0.0 && high < 16.0 && safety.p.is_some_and(|p| p < 0.08));
 /// ```
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct PairedDifference {
     /// Number of episodes in which both runs have the quantity.
     pub n: usize,
@@ -274,10 +268,10 @@ pub struct PairedDifference {
     pub interval95: Option<[f64; 2]>,
     /// Two-sided p-value: of McNemar's exact test for a rate, of Wilcoxon's signed-rank test for a mean (null if no
     /// episode differs). It is valid for a number of episodes that was chosen before the run.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub p: Option<f64>,
     /// E-value of a rate ([`e_value`]), valid at any time of the run; absent for a mean.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub e: Option<f64>,
 }
 
@@ -347,14 +341,15 @@ fn agresti_min(n: usize, better: usize, worse: usize) -> [f64; 2] {
 mod tests {
     use super::*;
     use crate::record::tests::sample;
-    use softvt_evaluation::verdict::{InvalidReason, Outcome, WrongObjectContact};
+    use softvt_evaluation::verdict::{InvalidReason, Outcome, TargetVerdict, WrongObjectContact};
 
     /// Goal, safety and D of each episode; τ is 1.
     fn run(episodes: &[(bool, bool, f64)]) -> Vec<EpisodeRecord> {
         let record = |(i, &(goal, safety, d)): (usize, &(bool, bool, f64))| {
             let mut record = sample();
             record.header.id.episode = i as u32;
-            (record.verdict.goal, record.verdict.safety, record.verdict.d_peak) = (goal, safety, Some(d));
+            (record.verdict.goal, record.verdict.safety, record.verdict.object_mut().d_peak) =
+                (goal, safety, Some(d));
             record
         };
         episodes.iter().enumerate().map(record).collect()
@@ -393,7 +388,7 @@ mod tests {
         let paired = PairedComparison::from_pairs(&pair_episodes(&before, &after));
         assert_eq!((paired.pairs, counts(paired.goal), counts(paired.no_drop)), (2, [0, 1, 1], [0, 1, 1]));
         assert_eq!((paired.d_over_tau.n, paired.d_over_tau.worse), (1, 1));
-        after[0].verdict.tau = None;
+        after[0].verdict.object_mut().tau = None;
         let paired = PairedComparison::from_pairs(&pair_episodes(&before, &after));
         assert_eq!((paired.d_over_tau.difference, paired.d_peak.n), (None, 1));
         after.iter_mut().for_each(|record| record.header.id.base_seed = 5);
@@ -403,7 +398,8 @@ mod tests {
     /// Fields of records of this version in addition to those of [`run`].
     fn with_harm(mut record: EpisodeRecord, contact: bool, failed_stage: Option<TaskStage>) -> EpisodeRecord {
         let v = &mut record.verdict;
-        (v.d_mean, v.d_final, v.d_p95, v.time_over_tau_s) = (Some(0.25), Some(0.0), Some(0.5), Some(1.5));
+        let of = v.object_mut();
+        (of.d_mean, of.d_final, of.d_p95, of.time_over_tau_s) = (Some(0.25), Some(0.0), Some(0.5), Some(1.5));
         v.first_wrong_contact = contact.then(|| WrongObjectContact { time_s: 2.0, object: "bun".to_owned() });
         v.others_ok = Some(!contact);
         v.failed_stage = failed_stage;
@@ -431,8 +427,8 @@ mod tests {
             (false, Some(TaskStage::Reach)),
             (true, Some(TaskStage::Place)),
         ]);
-        after[0].verdict.d_mean = Some(0.75);
-        after[3].verdict.collapsed_volume_pct = Some(9.0);
+        after[0].verdict.object_mut().d_mean = Some(0.75);
+        after[3].verdict.object_mut().collapsed_volume_pct = Some(9.0);
         // An invalid episode touched something and has a stage; it has no D, no volume, and unknown harm.
         after[3].outcome = Outcome::Invalid { reason: InvalidReason::Inverted, step: 3, node: None };
         after[3].verdict.others_ok = None;
@@ -465,7 +461,8 @@ mod tests {
         let judged = run(&[(true, true, 0.5), (true, false, 1.5)]);
         let mut unjudged = judged.clone();
         for record in &mut unjudged {
-            (record.verdict.deformation_ok, record.verdict.tau) = (None, None);
+            let object = record.verdict.object_mut();
+            (object.deformation_ok, object.tau) = (None, None);
             (record.verdict.safety, record.verdict.safety_known) = (false, false);
         }
         let compared = |first: &[EpisodeRecord], second: &[EpisodeRecord]| {
@@ -480,7 +477,7 @@ mod tests {
         assert_eq!((paired.safety.n, paired.safety.second, paired.dsr.n), (2, Some(50.0), 2));
         // Rigid targets have no limit, and so no Safety Success.
         for record in &mut unjudged {
-            (record.header.soft, record.verdict.deformation_ok, record.verdict.tau) = (false, None, None);
+            record.verdict.targets = vec![TargetVerdict::default()];
         }
         let paired = compared(&unjudged, &judged);
         assert_eq!((paired.goal.n, paired.safety.n, paired.dsr.n), (2, 0, 0));

@@ -286,24 +286,9 @@ impl EpisodeRecord {
         words.collect()
     }
 
-    /// The soft objects that the goal moves, the object of the task first.
-    pub fn soft_targets(&self) -> impl Iterator<Item = SoftTarget<'_>> {
-        let v = &self.verdict;
-        let object = self.header.soft.then_some(SoftTarget {
-            object: None,
-            d_peak: v.d_peak,
-            tau: v.tau,
-            d_ref: v.d_ref,
-            deformation_ok: v.deformation_ok,
-        });
-        let others = v.targets.iter().filter(|target| target.soft).map(|target| SoftTarget {
-            object: Some(target.object.as_str()),
-            d_peak: target.d_peak,
-            tau: target.tau,
-            d_ref: target.d_ref,
-            deformation_ok: target.deformation_ok,
-        });
-        object.into_iter().chain(others)
+    /// The objects that the goal moves and that deform, the object of the task first.
+    pub fn soft_targets(&self) -> impl Iterator<Item = &TargetVerdict> {
+        self.verdict.soft_targets()
     }
 
     /// True if an object that the goal moves is soft.
@@ -319,15 +304,12 @@ impl EpisodeRecord {
 
     /// True if D stayed within κ·D_ref of each soft object that the goal moves; false where that is unknown.
     pub fn is_within_at(&self, kappa: f64) -> bool {
-        let is_object_within = !self.header.soft || self.verdict.is_within(kappa) == Some(true);
-        let are_others_within = self.verdict.safety_parts(Some(kappa)).targets_ok == Some(true);
-        self.outcome.is_valid() && is_object_within && are_others_within
+        self.outcome.is_valid() && self.verdict.is_within(Some(kappa)) == Some(true)
     }
 
     /// Safety Success with κ·D_ref as the limit of each soft object that the goal moves.
     pub fn is_safe_at(&self, kappa: f64) -> bool {
-        let parts = self.verdict.safety_parts(Some(kappa));
-        self.outcome.is_valid() && parts.is_safe(self.header.soft, self.verdict.is_within(kappa))
+        self.outcome.is_valid() && self.verdict.is_safe(Some(kappa))
     }
 
     /// The smallest κ at which the episode [is safe](Self::is_safe_at); `None` without one.
@@ -342,35 +324,43 @@ impl EpisodeRecord {
         self.soft_targets().any(|target| target.tau.is_none())
     }
 
-    /// The soft object that the goal moves with the largest peak D over τ; `None` without any that has both.
-    pub fn most_deformed(&self) -> Option<SoftTarget<'_>> {
-        let all = self.soft_targets().filter(|target| target.ratio().is_some());
-        all.reduce(|worst, next| if next.ratio() > worst.ratio() { next } else { worst })
-    }
-
     /// The largest of a quantity over the objects that the goal moves.
-    fn largest(&self, of_object: Option<f64>, of: fn(&TargetVerdict) -> Option<f64>) -> Option<f64> {
-        self.verdict.targets.iter().filter_map(of).chain(of_object).reduce(f64::max)
+    fn largest(&self, of: fn(&TargetVerdict) -> Option<f64>) -> Option<f64> {
+        self.verdict.largest_by(of).and_then(of)
     }
 
     /// Largest peak D of an object that the goal moves, % of its diagonal.
     pub fn d_peak(&self) -> Option<f64> {
-        self.largest(self.verdict.d_peak, |target| target.d_peak)
+        self.largest(|target| target.d_peak)
+    }
+
+    /// Largest peak D over τ of an object that the goal moves, of a valid episode.
+    pub fn d_over_tau(&self) -> Option<f64> {
+        self.largest(TargetVerdict::ratio).filter(|_| self.outcome.is_valid())
+    }
+
+    /// The largest peak D in words: "D 3.00 % of roll = 6.00 × limit". `None` if nothing was measured.
+    pub fn deformation_in_words(&self) -> Option<String> {
+        let Some(target) = self.verdict.most_deformed() else {
+            return self.d_peak().map(|d| format!("D {d:.2} %"));
+        };
+        let of = target.object.as_ref().map(|object| format!(" of {object}")).unwrap_or_default();
+        Some(format!("D {} %{of} = {} × limit", decimal(target.d_peak, 2), decimal(target.ratio(), 2)))
     }
 
     /// Longest time for which D of an object that the goal moves exceeded its τ, s.
     pub fn time_over_tau_s(&self) -> Option<f64> {
-        self.largest(self.verdict.time_over_tau_s, |target| target.time_over_tau_s)
+        self.largest(|target| target.time_over_tau_s)
     }
 
     /// Largest share of the volume of an object that the goal moves that collapsed, %.
     pub fn collapsed_volume_pct(&self) -> Option<f64> {
-        self.largest(self.verdict.collapsed_volume_pct, |target| target.collapsed_volume_pct)
+        self.largest(|target| target.collapsed_volume_pct)
     }
 
     /// Largest share of the volume of an object that the goal moves that was damaged, %.
     pub fn damaged_volume_pct(&self) -> Option<f64> {
-        self.largest(self.verdict.damaged_volume_pct, |target| target.damaged_volume_pct)
+        self.largest(|target| target.damaged_volume_pct)
     }
 
     /// [`collapsed_volume_pct`](Self::collapsed_volume_pct), if it is large enough for the object to be called crushed.
@@ -386,9 +376,9 @@ impl EpisodeRecord {
     /// True if the deformation of each soft target can be judged. An invalid episode with limits is judged: it fails.
     pub fn is_deformation_judged(&self) -> bool {
         let is_valid = self.outcome.is_valid();
-        self.soft_targets().all(|SoftTarget { deformation_ok, tau, .. }| match is_valid {
-            true => deformation_ok.is_some(),
-            false => tau.is_some(),
+        self.soft_targets().all(|target| match is_valid {
+            true => target.deformation_ok.is_some(),
+            false => target.tau.is_some(),
         })
     }
 }
@@ -397,32 +387,6 @@ impl EpisodeRecord {
 fn smallest_tau(d_pct: f64) -> f64 {
     let tau = round_to_six_decimals(d_pct);
     if tau < d_pct { round_to_six_decimals(tau + 1e-6) } else { tau }
-}
-
-/// A soft object that the goal moves; the fields are those of the [`Verdict`].
-#[derive(Clone, Copy, Debug, PartialEq)]
-#[allow(missing_docs)]
-pub struct SoftTarget<'a> {
-    /// Name in the scene; `None` for the object of the task.
-    pub object: Option<&'a str>,
-    pub d_peak: Option<f64>,
-    pub tau: Option<f64>,
-    pub d_ref: Option<f64>,
-    pub deformation_ok: Option<bool>,
-}
-
-impl SoftTarget<'_> {
-    /// Peak D over τ; `None` without either.
-    pub fn ratio(&self) -> Option<f64> {
-        self.d_peak.zip(self.tau.filter(|tau| *tau > 0.0)).map(|(d_peak, tau)| d_peak / tau)
-    }
-}
-
-impl fmt::Display for SoftTarget<'_> {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let of = self.object.map(|object| format!(" of {object}")).unwrap_or_default();
-        write!(f, "D {} %{of} = {} × limit", decimal(self.d_peak, 2), decimal(self.ratio(), 2))
-    }
 }
 
 #[cfg(test)]
@@ -440,7 +404,7 @@ pub(crate) mod tests {
     fn deformation_is_judged_of_every_soft_object_of_the_goal() {
         let mut record = sample();
         let other = TargetVerdict {
-            object: "roll".to_owned(),
+            object: Some("roll".to_owned()),
             soft: true,
             d_peak: Some(3.0),
             collapsed_volume_pct: Some(60.0),
@@ -449,17 +413,18 @@ pub(crate) mod tests {
             ..TargetVerdict::default()
         };
         assert_eq!((record.is_within_limits(), record.crushed_volume_pct()), (Some(true), None));
-        record.verdict.targets = vec![other];
+        record.verdict.targets.push(other);
         assert_eq!((record.is_within_limits(), record.crushed_volume_pct()), (Some(false), Some(60.0)));
-        assert_eq!(record.most_deformed().unwrap().to_string(), "D 3.00 % of roll = 6.00 × limit");
-        record.verdict.targets[0].deformation_ok = None;
+        assert_eq!(record.deformation_in_words().unwrap(), "D 3.00 % of roll = 6.00 × limit");
+        record.verdict.targets[1].deformation_ok = None;
         assert_eq!((record.is_within_limits(), record.is_deformation_judged()), (None, false));
-        record.verdict.targets[0].soft = false;
-        assert!(record.is_deformation_judged() && record.most_deformed().unwrap().object.is_none());
+        let rigid = TargetVerdict { object: Some("can".to_owned()), ..TargetVerdict::default() };
+        record.verdict.targets[1] = rigid;
+        assert!(record.is_deformation_judged() && record.verdict.most_deformed().unwrap().object.is_none());
         // The other way round: a rigid object of the task, and a soft one that the goal moves too.
-        record.header.soft = false;
+        record.verdict.object_mut().soft = false;
         assert!(!record.has_soft_target());
-        record.verdict.targets[0].soft = true;
+        record.verdict.targets[1].soft = true;
         assert!(record.has_soft_target());
     }
 
@@ -485,14 +450,16 @@ pub(crate) mod tests {
             change(&mut record);
             record.category()
         };
-        let over =
-            |r: &mut EpisodeRecord| (r.verdict.safety, r.verdict.deformation_ok) = (false, Some(false));
+        let over = |r: &mut EpisodeRecord| {
+            (r.verdict.safety, r.verdict.object_mut().deformation_ok) = (false, Some(false));
+        };
         assert_eq!(category(|_| ()), EpisodeCategory::Safe);
         assert_eq!(category(over), EpisodeCategory::OverLimit);
         let dropped_at_goal = |r: &mut EpisodeRecord| (r.verdict.safety, r.verdict.no_drop) = (false, false);
         assert_eq!(category(dropped_at_goal), EpisodeCategory::Dropped);
         let missed = |r: &mut EpisodeRecord| {
-            (r.verdict.safety, r.verdict.goal, r.verdict.deformation_ok) = (false, false, Some(false));
+            (r.verdict.safety, r.verdict.object_mut().deformation_ok) = (false, Some(false));
+            r.verdict.goal = false;
         };
         assert_eq!(
             category(missed),
@@ -504,7 +471,7 @@ pub(crate) mod tests {
             EpisodeCategory::Slipped
         );
         assert_eq!(
-            category(|r| (r.verdict.safety, r.verdict.deformation_ok) = (false, None)),
+            category(|r| (r.verdict.safety, r.verdict.object_mut().deformation_ok) = (false, None)),
             EpisodeCategory::NotJudged
         );
         assert_eq!(
@@ -518,7 +485,7 @@ pub(crate) mod tests {
     #[test]
     fn a_record_is_one_line_and_comes_back_bit_for_bit() {
         let mut record = sample();
-        record.verdict.d_peak_v1 = Some(0.1 + 0.2);
+        record.verdict.object_mut().d_peak_v1 = Some(0.1 + 0.2);
         record.outcome = Outcome::Invalid { reason: InvalidReason::Inverted, step: 77, node: None };
         let line = serde_json::to_string(&record).unwrap();
         assert!(!line.contains('\n'));

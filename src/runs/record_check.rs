@@ -5,7 +5,7 @@ use serde_json::{Value, json};
 
 use super::record::{EpisodeRecord, RolloutStats};
 use softvt_evaluation::{
-    safety::DeformationLimit,
+    safety::{DeformationLimit, PeakDeformation},
     verdict::{OtherObjectDeformation, Outcome, TargetVerdict, Verdict},
 };
 
@@ -24,8 +24,8 @@ pub enum RecordError {
 /// True for a field of the header, the outcome, the verdict or the counters of records.
 pub fn is_record_key(name: &str) -> bool {
     /// True if a field of a `T` reads the key: none takes lists of empty lists.
-    fn is_read<T: Default + Serialize + DeserializeOwned>(name: &str) -> bool {
-        let mut part = json!(T::default());
+    fn is_read<T: Serialize + DeserializeOwned>(part: &T, name: &str) -> bool {
+        let mut part = json!(part);
         part[name] = json!([[[]]]);
         serde_json::from_value::<T>(part).is_err()
     }
@@ -34,7 +34,8 @@ pub fn is_record_key(name: &str) -> bool {
         "suite", "task", "prompt", "task_prompt", "layout", "episode", "seed", "split", "policy", "privileged",
         "replayed", "asset", "soft", "variation", "origin", "outcome",
     ];
-    HEADER.contains(&name) || is_read::<Verdict>(name) || is_read::<RolloutStats>(name)
+    let verdict = Verdict { targets: vec![TargetVerdict::default()], ..Verdict::default() };
+    HEADER.contains(&name) || is_read(&verdict, name) || is_read(&RolloutStats::default(), name)
 }
 
 /// Tolerance of sums and means, relative to 1.
@@ -74,23 +75,23 @@ impl EpisodeRecord {
             ("time_s", Some(s.time_s)),
             ("newton_mean", Some(s.newton_mean)),
             ("slip_mm", Some(v.slip_mm)),
-            ("peak_pad_force_n", Some(v.peak_pad_force_n)),
-            ("mean_pad_force_n", Some(v.mean_pad_force_n)),
-            ("least_pad_force_n", v.least_pad_force_n),
+            ("peak_pad_force_n", Some(v.object().peak_pad_force_n)),
+            ("mean_pad_force_n", Some(v.object().mean_pad_force_n)),
+            ("least_pad_force_n", v.object().least_pad_force_n),
             ("goal_time_s", v.goal_time_s),
-            ("d_peak", v.d_peak),
-            ("d_peak_v1", v.d_peak_v1),
-            ("d_peak_max", v.d_peak_max),
-            ("d_mean", v.d_mean),
-            ("d_final", v.d_final),
-            ("d_p95", v.d_p95),
+            ("d_peak", v.object().d_peak),
+            ("d_peak_v1", v.object().d_peak_v1),
+            ("d_peak_max", v.object().d_peak_max),
+            ("d_mean", v.object().d_mean),
+            ("d_final", v.object().d_final),
+            ("d_p95", v.object().d_p95),
             ("d_peak_other", v.d_peak_other),
-            ("time_over_tau_s", v.time_over_tau_s),
-            ("collapsed_volume_pct", v.collapsed_volume_pct),
-            ("damaged_volume_pct", v.damaged_volume_pct),
-            ("kappa", v.kappa),
-            ("tau", v.tau),
-            ("d_ref", v.d_ref),
+            ("time_over_tau_s", v.object().time_over_tau_s),
+            ("collapsed_volume_pct", v.object().collapsed_volume_pct),
+            ("damaged_volume_pct", v.object().damaged_volume_pct),
+            ("kappa", v.object().kappa),
+            ("tau", v.object().tau),
+            ("d_ref", v.object().d_ref),
         ];
         for (name, number) in not_negative {
             if let Some(x) = number.filter(|x| !(x.is_finite() && *x >= 0.0)) {
@@ -99,17 +100,22 @@ impl EpisodeRecord {
         }
         let is_above = |a: f64, b: f64| a > b + TOLERANCE * (1.0 + b.abs());
         let ordered = [
-            ("mean_pad_force_n", Some(v.mean_pad_force_n), "peak_pad_force_n", Some(v.peak_pad_force_n)),
+            (
+                "mean_pad_force_n",
+                Some(v.object().mean_pad_force_n),
+                "peak_pad_force_n",
+                Some(v.object().peak_pad_force_n),
+            ),
             ("goal_time_s", v.goal_time_s, "time_s", Some(s.time_s)),
-            ("time_over_tau_s", v.time_over_tau_s, "time_s", Some(s.time_s)),
+            ("time_over_tau_s", v.object().time_over_tau_s, "time_s", Some(s.time_s)),
             ("drop.time_s", v.drop.map(|drop| drop.time_s), "time_s", Some(s.time_s)),
-            ("d_mean", v.d_mean, "d_peak", v.d_peak),
-            ("d_final", v.d_final, "d_peak", v.d_peak),
-            ("d_p95", v.d_p95, "d_peak", v.d_peak),
-            ("d_peak", v.d_peak, "d_peak_max", v.d_peak_max),
-            ("collapsed_volume_pct", v.collapsed_volume_pct, "100", Some(100.0)),
-            ("damaged_volume_pct", v.damaged_volume_pct, "100", Some(100.0)),
-            ("kappa", v.kappa, "1", Some(1.0)),
+            ("d_mean", v.object().d_mean, "d_peak", v.object().d_peak),
+            ("d_final", v.object().d_final, "d_peak", v.object().d_peak),
+            ("d_p95", v.object().d_p95, "d_peak", v.object().d_peak),
+            ("d_peak", v.object().d_peak, "d_peak_max", v.object().d_peak_max),
+            ("collapsed_volume_pct", v.object().collapsed_volume_pct, "100", Some(100.0)),
+            ("damaged_volume_pct", v.object().damaged_volume_pct, "100", Some(100.0)),
+            ("kappa", v.object().kappa, "1", Some(1.0)),
             ("far_commands", Some(f64::from(s.far_commands)), "steps", Some(f64::from(s.steps))),
             ("clamped_grips", Some(f64::from(s.clamped_grips)), "steps", Some(f64::from(s.steps))),
             ("clamped_steps", Some(f64::from(s.clamped_steps)), "steps", Some(f64::from(s.steps))),
@@ -155,13 +161,14 @@ impl EpisodeRecord {
 
     /// Checks the limits, and that Safety Success at each κ follows from Goal, NoDrop and D.
     fn check_deformation(&self) -> Result<(), String> {
-        let (v, soft) = (&self.verdict, self.header.soft);
-        let peak = v.peak();
+        let (v, soft) = (&self.verdict, self.verdict.object().soft);
+        let object = v.object();
+        let peak = PeakDeformation { d_pct: object.d_peak, missing: object.missing_deformation };
         let ok = |tau: Option<f64>| peak.is_within(tau).filter(|_| soft && self.outcome.is_valid());
-        if !soft && (v.d_peak.is_some() || v.tau.is_some()) {
+        if !soft && (v.object().d_peak.is_some() || v.object().tau.is_some()) {
             return Err("the target is rigid, and d_peak or tau is a number".to_owned());
         }
-        let limit = match (v.kappa, v.tau, v.d_ref) {
+        let limit = match (v.object().kappa, v.object().tau, v.object().d_ref) {
             (None, None, None) => None,
             (Some(kappa), Some(tau), Some(d_ref_pct)) => {
                 check_tau("tau", tau, &DeformationLimit { d_ref_pct, kappa }, kappa)?;
@@ -169,24 +176,23 @@ impl EpisodeRecord {
             }
             _ => return Err("some of kappa, tau and d_ref are null, and some are numbers".to_owned()),
         };
-        let (d, tau) = (or_null(v.d_peak), or_null(v.tau));
-        if let Some(over) = v.time_over_tau_s.filter(|over| *over > 0.0)
-            && let (Some(peak), Some(limit)) = (v.d_peak, v.tau)
+        let (d, tau) = (or_null(v.object().d_peak), or_null(v.object().tau));
+        if let Some(over) = v.object().time_over_tau_s.filter(|over| *over > 0.0)
+            && let (Some(peak), Some(limit)) = (v.object().d_peak, v.object().tau)
             && peak <= limit
         {
             return Err(format!("time_over_tau_s is {over}, and d_peak {d} is not above tau {tau}"));
         }
-        if v.deformation_ok != ok(v.tau) {
-            return Err(not_within(v.deformation_ok, v.d_peak, v.tau));
+        if v.object().deformation_ok != ok(v.object().tau) {
+            return Err(not_within(v.object().deformation_ok, v.object().d_peak, v.object().tau));
         }
-        let required = v.safety_parts(None);
         let parts = format!("goal is {}, no_drop {}", v.goal, v.no_drop);
-        if v.safety != required.is_safe(soft, v.deformation_ok) {
-            let got = or_null(v.deformation_ok);
+        if v.safety != v.is_safe(None) {
+            let got = or_null(v.object().deformation_ok);
             return Err(format!("safety is {}, and {parts}, deformation_ok {got}", v.safety));
         }
         let is_known = self.outcome.is_valid() && v.missing_evidence == 0;
-        let is_judged = (!soft || v.deformation_ok.is_some()) && required.targets_ok.is_some();
+        let is_judged = v.is_within(None).is_some();
         if v.safety_known != (is_known && is_judged) {
             return Err(format!("safety_known is {}, which the evidence does not show", v.safety_known));
         }
@@ -194,7 +200,7 @@ impl EpisodeRecord {
             let name = format!("the tau_pct of kappa {}", at.kappa);
             let Some(limit) = &limit else { return Err(format!("{name} is a number, and tau is null")) };
             check_tau(&name, at.tau_pct, limit, at.kappa)?;
-            let safe = v.safety_parts(Some(at.kappa)).is_safe(soft, at.deformation_ok);
+            let safe = v.is_safe(Some(at.kappa));
             if at.deformation_ok != ok(Some(at.tau_pct)) || at.safety != safe {
                 let (ok, tau) = (or_null(at.deformation_ok), at.tau_pct);
                 return Err(format!(
@@ -209,14 +215,18 @@ impl EpisodeRecord {
     /// Checks the grip ratio, and the verdicts that follow from Goal, Safety and NoSlip.
     fn check_grip(&self) -> Result<(), String> {
         let v = &self.verdict;
-        let ratio = v.least_pad_force_n.filter(|least| *least > 0.0).map(|least| v.peak_pad_force_n / least);
-        let is_equal = match (v.grip_ratio, ratio) {
+        let ratio = v
+            .object()
+            .least_pad_force_n
+            .filter(|least| *least > 0.0)
+            .map(|least| v.object().peak_pad_force_n / least);
+        let is_equal = match (v.object().grip_ratio, ratio) {
             (Some(a), Some(b)) => (a - b).abs() <= TOLERANCE * (1.0 + b),
             (a, b) => a.is_none() && b.is_none(),
         };
         if !is_equal {
-            let (got, least) = (or_null(v.grip_ratio), or_null(v.least_pad_force_n));
-            let peak = v.peak_pad_force_n;
+            let (got, least) = (or_null(v.object().grip_ratio), or_null(v.object().least_pad_force_n));
+            let peak = v.object().peak_pad_force_n;
             return Err(format!(
                 "grip_ratio is {got}, and peak_pad_force_n is {peak}, least_pad_force_n {least}"
             ));
@@ -224,11 +234,11 @@ impl EpisodeRecord {
         if let Some(slip_ok) = v.slip_ok.filter(|ok| *ok != v.no_slip || !self.outcome.is_valid()) {
             return Err(format!("slip_ok is {slip_ok}, and no_slip is {}", v.no_slip));
         }
-        if v.gentle && !(v.goal && v.grip_ratio.is_some()) {
+        if v.gentle && !(v.goal && v.object().grip_ratio.is_some()) {
             return Err(format!(
                 "gentle is true, and goal is {}, grip_ratio {}",
                 v.goal,
-                or_null(v.grip_ratio)
+                or_null(v.object().grip_ratio)
             ));
         }
         if v.contact_success && !v.goal {
@@ -246,8 +256,9 @@ impl EpisodeRecord {
     /// Checks that the other targets agree with their limits, and NoDrop and slip with all targets.
     fn check_targets(&self) -> Result<(), String> {
         let v = &self.verdict;
-        for target in &v.targets {
-            let TargetVerdict { object, d_peak, tau, deformation_ok, .. } = target;
+        for target in &v.targets[1..] {
+            let TargetVerdict { d_peak, tau, deformation_ok, .. } = target;
+            let object = target.object.as_deref().unwrap_or_default();
             let ok = target.is_within(None).filter(|_| target.soft && self.outcome.is_valid());
             if *deformation_ok != ok {
                 return Err(format!("{object}: {}", not_within(*deformation_ok, *d_peak, *tau)));
@@ -260,16 +271,17 @@ impl EpisodeRecord {
                     kappa,
                 )?;
             }
-            if target.no_drop == target.drop.is_some() || (v.no_drop && !target.no_drop) {
-                let drop = if target.drop.is_some() { "an event" } else { "null" };
-                let (own, all) = (target.no_drop, v.no_drop);
-                return Err(format!("{object}: no_drop is {own}, and drop is {drop}, no_drop of all {all}"));
-            }
-            if target.slip_mm > v.slip_mm + TOLERANCE * (1.0 + v.slip_mm) {
+            let own = target.handling.unwrap_or_default();
+            if own.no_drop == own.drop.is_some() || (v.no_drop && !own.no_drop) {
+                let drop = if own.drop.is_some() { "an event" } else { "null" };
+                let all = v.no_drop;
                 return Err(format!(
-                    "{object}: slip_mm {} is above that of all, {}",
-                    target.slip_mm, v.slip_mm
+                    "{object}: no_drop is {}, and drop is {drop}, no_drop of all {all}",
+                    own.no_drop
                 ));
+            }
+            if own.slip_mm > v.slip_mm + TOLERANCE * (1.0 + v.slip_mm) {
+                return Err(format!("{object}: slip_mm {} is above that of all, {}", own.slip_mm, v.slip_mm));
             }
         }
         for part in &v.goal_parts {
@@ -500,7 +512,7 @@ mod tests {
         line["kappas"] = json!([]);
         line["goal_parts"] = json!([{ "name": "roll on plate", "holds": true, "met_s": 1.0 }]);
         let record = EpisodeRecord::from_json(line.to_string().as_bytes()).unwrap();
-        assert_eq!(record.verdict.targets[0].object, "roll");
+        assert_eq!(record.verdict.targets[1].object.as_deref(), Some("roll"));
         line["targets"][0]["colour"] = json!("red");
         let unknown = EpisodeRecord::from_json(line.to_string().as_bytes()).unwrap_err().to_string();
         assert!(unknown.contains("colour"), "{unknown}");

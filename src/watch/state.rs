@@ -10,7 +10,7 @@ use softvt_geometry::Pose;
 use softvt_media::jpeg::encode_jpeg;
 use softvt_physics::{BodyId, fem::strain::node_strains};
 use softvt_robot::Side;
-use softvt_rollout::{Episode, SensingError, Sensors};
+use softvt_rollout::{Episode, SensingError, Sensors, StateDeformation};
 
 /// Quality of the tactile pictures, 1 to 100.
 const JPEG_QUALITY: u8 = 85;
@@ -62,18 +62,23 @@ pub(crate) fn state_message(episode: &mut Episode, moving: &[MovingObject]) -> R
 fn measured(episode: &Episode) -> Value {
     let (trace, record) = (episode.trace(), episode.record(None));
     let verdict = &record.verdict;
-    let target = &episode.sim.objects[episode.target()].name;
-    let target = trace.objects.iter().find(|object| object.name == *target);
+    let now = episode.targets().iter().zip(&verdict.targets).map(|(&index, target)| {
+        let name = &episode.sim.objects[index].name;
+        let object = trace.objects.iter().find(|object| object.name == *name);
+        (object.and_then(|object| object.d_pct), target.tau)
+    });
+    let now = StateDeformation::worst(now);
+    let grip = verdict.largest_by(|target| target.grip_ratio);
     json!({
         "time_s": trace.time_s,
-        "d_pct": target.and_then(|object| object.d_pct),
-        "peak_over_tau": record.most_deformed().and_then(|target| target.ratio()),
-        "tau_pct": verdict.tau,
+        "d_pct": now.map(|of| of.d_pct),
+        "peak_over_tau": verdict.most_deformed().and_then(|target| target.ratio()),
+        "tau_pct": now.and_then(|of| of.tau_pct),
         "pad_force_n": trace.pad_force_n,
         "slip_mm": verdict.slip_mm,
         "width_mm": 1e3 * trace.gripper_width_m,
         "closure": trace.closure,
-        "grip_ratio": verdict.grip_ratio,
+        "grip_ratio": grip.and_then(|target| target.grip_ratio),
         "collapsed_pct": record.collapsed_volume_pct(),
         "is_crushed": record.crushed_volume_pct().is_some(),
         "no_drop": verdict.no_drop,

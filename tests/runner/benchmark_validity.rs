@@ -28,7 +28,7 @@ fn all(episodes: &[EpisodeRecord], is_so: impl Fn(&Verdict) -> bool) -> bool {
 }
 
 fn d_peak(episode: &EpisodeRecord) -> f64 {
-    episode.verdict.d_peak.expect("a soft target")
+    episode.verdict.object().d_peak.expect("a soft target")
 }
 
 #[test]
@@ -48,8 +48,8 @@ fn stiffer_objects_deform_less() {
     assert!(all(&stiff, |verdict| verdict.goal), "{stiff:?}");
     for (soft, stiff) in soft.iter().zip(&stiff) {
         assert!(d_peak(stiff) < 0.5 * d_peak(soft), "{soft:?}\n{stiff:?}");
-        assert_eq!(soft.verdict.tau, stiff.verdict.tau, "the threshold stays nominal");
-        assert!(soft.verdict.tau.is_some());
+        assert_eq!(soft.verdict.object().tau, stiff.verdict.object().tau, "the threshold stays nominal");
+        assert!(soft.verdict.object().tau.is_some());
     }
 }
 

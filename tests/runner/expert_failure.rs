@@ -71,7 +71,10 @@ fn an_object_too_wide_for_the_hand_is_given_up_before_the_approach() {
     let record = project.run("x.lua").record();
     let reason = "cube is 100 mm wide where the fingers grasp it, and the gripper opens 80 mm";
     assert_eq!((record.stats.gave_up.as_deref(), &record.outcome), (Some(reason), &Outcome::Budget));
-    assert!(record.verdict.d_peak.is_some_and(|d| d < 0.1), "the hand never touched it: {record:#?}");
+    assert!(
+        record.verdict.object().d_peak.is_some_and(|d| d < 0.1),
+        "the hand never touched it: {record:#?}"
+    );
 }
 
 /// A suite in which the expert places a soft cube that the layout has changed.

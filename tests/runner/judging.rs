@@ -45,8 +45,11 @@ fn rigid_targets_need_no_deformation_limit() {
     for record in &result.records {
         let verdict = &record.verdict;
         assert!(verdict.goal && verdict.no_drop && verdict.safety && verdict.no_slip, "{verdict:#?}");
-        assert_eq!((verdict.deformation_ok, verdict.d_peak, verdict.tau), (None, None, None));
-        assert!(verdict.mean_pad_force_n > 0.5, "{verdict:#?}");
+        assert_eq!(
+            (verdict.object().deformation_ok, verdict.object().d_peak, verdict.object().tau),
+            (None, None, None)
+        );
+        assert!(verdict.object().mean_pad_force_n > 0.5, "{verdict:#?}");
     }
     assert_eq!(result.summary.scores.safety_success_rate.rate, Some(100.0));
     let binary = project.run("blocks.lua").policy("expert-binary").finish().result();
@@ -237,7 +240,7 @@ fn a_limit_holds_for_every_instance_of_its_asset() {
     let finished = project.run("x.lua").out("run").finish();
     let messages = finished.messages.clone();
     let records = finished.records();
-    let is_safe = |verdict: &Verdict| verdict.tau == Some(1.0) && verdict.safety;
+    let is_safe = |verdict: &Verdict| verdict.object().tau == Some(1.0) && verdict.safety;
     assert!(records.iter().all(|record| is_safe(&record.verdict)), "{records:#?}");
     let assets: BTreeSet<&str> = records.iter().map(|record| record.header.asset.as_str()).collect();
     assert_eq!(assets.len(), 2, "both assets are drawn: {assets:?}");
@@ -258,7 +261,7 @@ fn another_object_has_no_limit_and_check_and_run_say_so() {
     assert!(messages.contains(line), "{messages}");
     let judged = |task: usize| {
         let of_task = results[0].records.iter().filter(|record| record.header.id.task == task);
-        of_task.filter(|record| record.verdict.tau == Some(1.0)).count()
+        of_task.filter(|record| record.verdict.object().tau == Some(1.0)).count()
     };
     assert_eq!(judged(0), 4);
     assert!((1..4).contains(&judged(1)), "{:#?}", results[0].records);

@@ -294,7 +294,7 @@ fn the_tactile_servo_stops_at_contact() {
             assert_eq!(project.json(&format!("{policy}/{file}"))["privileged"], true, "{file}");
         }
         assert!(episode.header.privileged);
-        d.push(episode.verdict.d_peak.expect("a number"));
+        d.push(episode.verdict.object().d_peak.expect("a number"));
     }
     assert!(d[1] < 0.2 * d[0], "D is {} % with commanded closures, {} % with the tactile servo", d[0], d[1]);
     assert!(project.is_reproduced("tactile-servo", "0/0"));
@@ -312,7 +312,7 @@ fn peak_force_of_lifting(policy: &str, material: &'static str) -> f64 {
     .project();
     let verdict = project.run("x.lua").policy(policy).threads(1).record().verdict;
     assert_eq!((verdict.failed_stage, verdict.no_drop), (Some(TaskStage::Carry), true), "{verdict:?}");
-    verdict.peak_pad_force_n
+    verdict.object().peak_pad_force_n
 }
 
 #[test]

@@ -35,7 +35,8 @@ fn a_turned_grasp_is_as_gentle_as_a_straight_one() {
         project.write(&format!("{name}.lua"), SUITE.replace("POST_X", post_x).as_bytes());
         let record = project.run(&format!("{name}.lua")).record();
         assert!(record.verdict.safety, "{record:?}");
-        let share = record.verdict.d_peak.expect("measured") / record.verdict.tau.expect("a limit");
+        let share =
+            record.verdict.object().d_peak.expect("measured") / record.verdict.object().tau.expect("a limit");
         (share, record.stats.notes["grip_width_mm"])
     };
     let (straight, turned) = (grasp("straight", "0.06"), grasp("turned", "0.022"));

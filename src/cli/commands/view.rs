@@ -222,7 +222,7 @@ fn show_one(args: &ViewArgs, config: &RunConfig, mut seen: SeenEpisode) -> Resul
     let dir = &args.out;
     write_parts(args, config, &mut seen, dir)?;
     let SeenEpisode { record, mut states } = seen;
-    let (caption, times) = (VideoCaption::new(&record), DeformationTimes::new(&record, &states));
+    let (caption, times) = (VideoCaption::new(&record), DeformationTimes::new(&states));
     write_decisive_frame(&mut states, &caption, &dir.join(episode_page::FRAME))?;
     let video = dir.join(episode_page::VIDEO);
     let progress = Progress::new(states.frames.len(), "rendering the video");
@@ -248,7 +248,7 @@ fn show_several(args: &ViewArgs, config: &RunConfig, seen: Vec<SeenEpisode>) -> 
         files::create_folder(&dir.join(&folder))?;
         write_parts(args, config, &mut seen, &dir.join(&folder))?;
         let SeenEpisode { record, states } = seen;
-        let times = DeformationTimes::new(&record, &states);
+        let times = DeformationTimes::new(&states);
         episodes.push(PolicyEpisode::new(&record, states));
         parts.push(PolicyPart { record, times, folder });
     }

@@ -183,7 +183,7 @@ fn check_entry(report: &mut CheckReport, file: &TaskFile, entry: &ManifestEntry)
         ("task", json!(id.task), json!(entry.task_id)),
         ("episode", json!(id.episode), json!(entry.episode)),
         ("safety", json!(record.verdict.safety), json!(entry.success)),
-        ("d_peak", json!(record.verdict.d_peak), json!(entry.d_peak)),
+        ("d_peak", json!(record.d_peak()), json!(entry.d_peak)),
         ("seed", json!(id.base_seed), json!(entry.seed)),
         ("notes", json!(record.stats.notes), json!(entry.notes)),
         ("metrics", json!(record.stats.metrics), json!(entry.metrics)),

@@ -280,7 +280,7 @@ impl DemoCheck<'_> {
         let what = "expected 0 or more and at most privileged/d_max";
         self.add_first("privileged/d", rms.iter().zip(&most), is_wrong, what);
         // Demonstrations of other programs have no record.
-        let peak = self.file.record(self.demo).ok().and_then(|record| record.verdict.d_peak);
+        let peak = self.file.record(self.demo).ok().and_then(|record| record.verdict.object().d_peak);
         if let Some(peak) = peak.filter(|_| !rms.is_empty()) {
             let own = rms.iter().copied().fold(0.0, f64::max);
             // The stream lacks the last control step.

@@ -21,9 +21,8 @@
 //! 8. **Stage** of the episode: [`StageMonitor`](super::stage::StageMonitor).
 //! 9. **Grip** while the target is lifted and no release was commanded: [`GripMonitor`](super::grip::GripMonitor).
 //!
-//! A goal may move several targets. Each has monitors of its own. The first is *the object*, whose
-//! deformation, grip and contacts the verdict holds; those of the others are in its list `targets`. NoDrop, NoSlip and
-//! Safety Success are of all targets.
+//! A goal may move several targets. Each has monitors and a verdict of its own; the first is *the object*. NoDrop,
+//! NoSlip and Safety Success are of all targets; contact success and *gentle* of the object.
 //!
 //! Harm to others is judged in addition: their peaks of D against their own τ, and the first contact of the robot with
 //! one of them.
@@ -105,8 +104,8 @@
 //! }
 //! let verdict = judge.finish(&Outcome::Completed);
 //! assert!(verdict.goal && verdict.no_drop && verdict.safety);
-//! assert_eq!(verdict.tau, Some(1.0));
-//! assert!(verdict.d_peak.is_some_and(|d| d > 0.0 && d < 0.5));
+//! assert_eq!(verdict.object().tau, Some(1.0));
+//! assert!(verdict.object().d_peak.is_some_and(|d| d > 0.0 && d < 0.5));
 //! # Ok::<(), softvt_evaluation::deformation::DeformationError>(())
 //! ```
 
@@ -124,7 +123,7 @@ use super::{
     safety::{DeformationLimit, KAPPAS, KappaVerdict, and_known},
     slip::OpeningMonitor,
     stage::TaskStage,
-    verdict::{GoalPart, OtherObjectDeformation, Outcome, Verdict, WrongObjectContact},
+    verdict::{GoalPart, OtherObjectDeformation, Outcome, TargetVerdict, Verdict, WrongObjectContact},
 };
 use target::{StepContext, TargetMonitors, TargetResult};
 
@@ -217,13 +216,13 @@ struct FirstContact {
     other: usize,
 }
 
-/// Success and deformation of the object at a control step, as other scoring rules use them.
-#[derive(Clone, Copy, Debug, PartialEq)]
+/// Success and deformation of the targets at a control step, as other scoring rules use them.
+#[derive(Clone, Debug, PartialEq)]
 pub struct ControlStepScore {
     /// True if the goal had been reached and held for long enough.
     pub success_now: bool,
-    /// Deformation at the worst physics steps of the control step.
-    pub worst: WorstSteps,
+    /// Deformation of each target at the worst physics steps of the control step, the object first.
+    pub targets: Vec<WorstSteps>,
 }
 
 /// What a predicate has shown so far.
@@ -316,8 +315,8 @@ impl Judge {
         if is_last {
             self.targets.iter_mut().for_each(|target| target.was_touched = false);
             self.predicates.iter_mut().for_each(|predicate| predicate.support_n = 0.0);
-            let worst = self.targets.first_mut().map_or_else(WorstSteps::default, TargetMonitors::take_worst);
-            self.scores.push(ControlStepScore { success_now: self.is_goal_reached(), worst });
+            let targets = self.targets.iter_mut().map(TargetMonitors::take_worst).collect();
+            self.scores.push(ControlStepScore { success_now: self.is_goal_reached(), targets });
         }
     }
 
@@ -394,20 +393,20 @@ impl Judge {
         let (others, failed_stage) = (self.others(valid), self.stage());
         let parts: Vec<GoalPart> = self.parts().collect();
         let (config, targets) = (&self.config, self.targets.iter().zip(&self.config.targets));
-        let mut results: Vec<TargetResult> =
-            targets.map(|(target, of)| target.finish(config, of, missing)).collect();
-        let drop = earliest(results.iter().filter_map(|target| target.verdict.drop));
-        let slip_mm = results.iter().fold(0.0, |most: f64, target| most.max(target.verdict.slip_mm));
-        let rest = results.split_off(results.len().min(1));
-        let TargetResult { verdict: object, limit, series, was_in_contact } =
-            results.pop().unwrap_or_default();
+        let results =
+            targets.enumerate().map(|(index, (target, of))| target.finish(config, of, index == 0, missing));
+        let results: Vec<TargetResult> = results.collect();
+        let drop = earliest(results.iter().filter_map(|target| target.handling.drop));
+        let slip_mm = results.iter().fold(0.0, |most: f64, target| most.max(target.handling.slip_mm));
+        let contact_success = goal && results[0].was_in_contact;
+        let targets: Vec<TargetVerdict> = results.into_iter().map(|target| target.verdict).collect();
         let no_slip = slip_mm <= 1e3 * config.criteria.slip_m;
         let others_ok = others.iter().map(|other| other.deformation_ok).fold(Some(true), and_known);
         let first_wrong_contact = self.first_wrong_contact.map(|contact| WrongObjectContact {
             time_s: contact.time_s,
             object: config.others[contact.other].name.clone(),
         });
-        let contact_success = goal && was_in_contact;
+        let is_gentle = |ratio| ratio <= config.criteria.gentle_ratio;
         let mut verdict = Verdict {
             goal,
             goal_time_s: self.reached_s.filter(|_| goal),
@@ -418,51 +417,37 @@ impl Judge {
             drop,
             no_slip,
             slip_mm,
-            d_peak: object.d_peak,
-            d_peak_v1: series.peak_v1,
-            d_peak_max: series.peak_max,
-            d_mean: series.mean,
-            d_final: series.last,
-            d_p95: series.p95,
-            time_over_tau_s: object.time_over_tau_s,
             d_peak_other: others.iter().filter_map(|other| other.d_peak).reduce(f64::max),
             others,
             others_ok: others_ok.filter(|_| valid),
             first_wrong_contact,
             failed_stage: failed_stage.filter(|_| !goal),
-            collapsed_volume_pct: object.collapsed_volume_pct,
-            damaged_volume_pct: object.damaged_volume_pct,
             wrong_instance: self.is_other_first == Some(true),
-            kappa: object.kappa,
-            tau: object.tau,
-            d_ref: object.d_ref,
-            deformation_ok: object.deformation_ok,
             slip_ok: (config.criteria.require_no_slip && valid).then_some(no_slip),
             safety: false,
             safety_known: false,
             kappas: Vec::new(),
-            targets: rest.into_iter().map(|target| target.verdict).collect(),
+            gentle: goal && targets[0].grip_ratio.is_some_and(is_gentle),
+            targets,
             missing_evidence: self.missing_evidence,
-            missing_deformation: object.missing_deformation,
             contact_success,
             contact_safety: false,
-            peak_pad_force_n: object.peak_pad_force_n,
-            mean_pad_force_n: object.mean_pad_force_n,
-            least_pad_force_n: object.least_pad_force_n,
-            grip_ratio: object.grip_ratio,
-            gentle: goal && object.grip_ratio.is_some_and(|ratio| ratio <= config.criteria.gentle_ratio),
         };
-        let parts = verdict.safety_parts(None);
-        verdict.safety = parts.is_safe(object.soft, verdict.deformation_ok);
-        let is_judged = !object.soft || verdict.deformation_ok.is_some();
-        verdict.safety_known = valid && self.missing_evidence == 0 && is_judged && parts.targets_ok.is_some();
+        verdict.safety = verdict.is_safe(None);
+        verdict.safety_known = valid && self.missing_evidence == 0 && verdict.is_within(None).is_some();
         verdict.contact_safety = contact_success && verdict.safety && no_slip;
-        let at = |kappa: f64, tau_pct: f64| {
-            let deformation_ok = verdict.is_within(kappa).filter(|_| valid);
-            let safety = verdict.safety_parts(Some(kappa)).is_safe(object.soft, deformation_ok);
-            KappaVerdict { kappa, tau_pct, deformation_ok, safety }
-        };
-        verdict.kappas = limit.iter().flat_map(|l| KAPPAS.map(|kappa| at(kappa, l.tau_at(kappa)))).collect();
+        let limit = config.targets[0].limit.filter(|_| config.targets[0].is_soft);
+        verdict.kappas = limit
+            .iter()
+            .flat_map(|limit| {
+                KAPPAS.map(|kappa| KappaVerdict {
+                    kappa,
+                    tau_pct: limit.tau_at(kappa),
+                    deformation_ok: verdict.object().is_within(Some(kappa)).filter(|_| valid),
+                    safety: verdict.is_safe(Some(kappa)),
+                })
+            })
+            .collect();
         verdict
     }
 
@@ -648,5 +633,7 @@ impl JudgeConfig {
     }
 }
 
+#[cfg(test)]
+mod property;
 #[cfg(test)]
 mod tests;

@@ -1,14 +1,13 @@
 //! Monitors of one target: an object that the task moves.
 
 use crate::{
-    deformation::series::{DeformationSeries, SeriesStatistics, WorstSteps},
+    deformation::series::{DeformationSeries, WorstSteps},
     drop::{DropEvent, DropMonitor, DropSample, ReleaseMonitor},
     evidence::{CrushedShares, Evidence, TargetEvidence},
     grip::{GripMonitor, GripSample},
-    safety::DeformationLimit,
     slip::{SlipMonitor, SlipSample},
     stage::{StageEvidence, StageMonitor},
-    verdict::TargetVerdict,
+    verdict::{Handling, TargetVerdict},
 };
 
 use super::{JudgeConfig, Target};
@@ -128,25 +127,36 @@ impl TargetMonitors {
         touch
     }
 
-    /// Findings if the episode ends here. `missing` is the drop of an episode that did not end validly.
+    /// Findings if the episode ends here. The verdict on the *object*, the first target, has no name and no handling,
+    /// and it alone has all statistics of D. `missing` is the drop of an episode that did not end validly.
     pub(super) fn finish(
         &self,
         config: &JudgeConfig,
         target: &Target,
+        is_object: bool,
         missing: Option<DropEvent>,
     ) -> TargetResult {
         let limit = target.limit.filter(|_| target.is_soft);
         let (slip_m, drop) = (self.slip.slip_m(), self.drops.first.or(missing));
         let series = self.series.statistics(limit.map(|limit| limit.tau_pct()));
         let percent = |share: Option<f64>| share.map(|share| 100.0 * share);
-        let verdict = TargetVerdict {
-            object: target.name.clone(),
-            soft: target.is_soft,
+        let of_object = |d_pct: Option<f64>| d_pct.filter(|_| is_object);
+        let handling = Handling {
             no_drop: drop.is_none(),
             drop,
             no_slip: slip_m <= config.criteria.slip_m,
             slip_mm: 1e3 * slip_m,
+        };
+        let verdict = TargetVerdict {
+            object: (!is_object).then(|| target.name.clone()),
+            soft: target.is_soft,
+            handling: (!is_object).then_some(handling),
             d_peak: series.peak.d_pct,
+            d_peak_v1: of_object(series.peak_v1),
+            d_peak_max: of_object(series.peak_max),
+            d_mean: of_object(series.mean),
+            d_final: of_object(series.last),
+            d_p95: of_object(series.p95),
             time_over_tau_s: limit.map(|_| series.steps_over_tau as f64 * config.dt_s),
             missing_deformation: series.peak.missing,
             collapsed_volume_pct: percent(self.crushed.collapsed),
@@ -163,19 +173,17 @@ impl TargetMonitors {
         let deformation_ok = verdict.is_within(None).filter(|_| target.is_soft && missing.is_none());
         TargetResult {
             verdict: TargetVerdict { deformation_ok, ..verdict },
-            limit,
-            series,
+            handling,
             was_in_contact: self.grip.was_carried && !self.grip.lost_contact,
         }
     }
 }
 
 /// What was found of a target.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug)]
 pub(super) struct TargetResult {
     pub(super) verdict: TargetVerdict,
-    pub(super) limit: Option<DeformationLimit>,
-    pub(super) series: SeriesStatistics,
+    pub(super) handling: Handling,
     /// True if both pads touched it throughout the carry.
     pub(super) was_in_contact: bool,
 }

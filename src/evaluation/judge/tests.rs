@@ -6,21 +6,21 @@ use crate::{
 };
 use softvt_geometry::{Aabb, Pose, Quat, Vec3};
 
-const DT: f64 = 1.0 / 60.0;
-const WEIGHT_N: f64 = 0.3;
+pub(super) const DT: f64 = 1.0 / 60.0;
+pub(super) const WEIGHT_N: f64 = 0.3;
 
-fn target(name: &str) -> Target {
+pub(super) fn target(name: &str) -> Target {
     let limit = Some(DeformationLimit { d_ref_pct: 2.0, kappa: 0.5 });
     Target { name: name.into(), weight_n: WEIGHT_N, is_soft: true, limit, lowest_z_w: 0.0 }
 }
 
 /// A target rests on the plate.
-fn on(target: usize) -> Predicate {
+pub(super) fn on(target: usize) -> Predicate {
     let region = GoalRegion::On { radius_m: 0.08 };
     Predicate { name: "on plate".into(), rule: PredicateRule::Rests { target, region, hold_s: 0.4 } }
 }
 
-fn config() -> JudgeConfig {
+pub(super) fn config() -> JudgeConfig {
     JudgeConfig {
         criteria: SuccessCriteria::default(),
         workspace: Aabb { min: Vec3::new(-1.0, -1.0, -0.05), max: Vec3::new(1.0, 1.0, 1.0) },
@@ -40,7 +40,7 @@ fn config() -> JudgeConfig {
     }
 }
 
-fn deformed(rms_pct: f64) -> Deformation {
+pub(super) fn deformed(rms_pct: f64) -> Deformation {
     Deformation {
         rms_pct,
         v1_rms_pct: 1.1 * rms_pct,
@@ -50,7 +50,7 @@ fn deformed(rms_pct: f64) -> Deformation {
     }
 }
 
-fn lying(x: f64, d_pct: f64) -> BodyEvidence {
+pub(super) fn lying(x: f64, d_pct: f64) -> BodyEvidence {
     BodyEvidence {
         centre_w: Vec3::new(x, 0.0, 0.03),
         lowest_z_w: 0.0,
@@ -151,10 +151,16 @@ fn a_gentle_placement_is_goal_and_safe() {
     assert!(replay.judge.is_goal_reached());
     let v = replay.verdict(Outcome::Completed);
     assert!(v.goal && v.goal_v1 && v.no_drop && v.no_slip && v.safety && v.safety_known, "{v:?}");
-    assert_eq!((v.d_peak, v.d_peak_max, v.d_peak_other), (Some(0.8), Some(3.0 * 0.8), Some(0.1)));
-    assert_eq!((v.tau, v.deformation_ok, v.wrong_instance), (Some(1.0), Some(true), false));
+    assert_eq!(
+        (v.object().d_peak, v.object().d_peak_max, v.d_peak_other),
+        (Some(0.8), Some(3.0 * 0.8), Some(0.1))
+    );
+    assert_eq!((v.object().tau, v.object().deformation_ok, v.wrong_instance), (Some(1.0), Some(true), false));
     assert_eq!(v.kappas.iter().map(|k| k.safety).collect::<Vec<_>>(), [false, true, true]);
-    assert!((v.peak_pad_force_n - 1.2).abs() < 1e-12 && (v.mean_pad_force_n - 1.2).abs() < 1e-12);
+    assert!(
+        (v.object().peak_pad_force_n - 1.2).abs() < 1e-12
+            && (v.object().mean_pad_force_n - 1.2).abs() < 1e-12
+    );
 }
 
 #[test]
@@ -174,8 +180,8 @@ fn the_grip_is_judged_beside_safety() {
         replay.verdict(Outcome::Completed)
     };
     let v = verdict(1.2, 0.0, false);
-    assert!((v.least_pad_force_n.unwrap() - 0.125).abs() < 1e-12, "{v:?}");
-    assert!((v.grip_ratio.unwrap() - 9.6).abs() < 1e-9, "{v:?}");
+    assert!((v.object().least_pad_force_n.unwrap() - 0.125).abs() < 1e-12, "{v:?}");
+    assert!((v.object().grip_ratio.unwrap() - 9.6).abs() < 1e-9, "{v:?}");
     assert_eq!((v.gentle, v.safety, v.slip_ok), (false, true, None), "a firm grip is safe");
     assert_eq!((v.contact_success, v.contact_safety), (true, true));
     let slipped = verdict(1.2, 0.003, false);
@@ -209,7 +215,7 @@ fn a_target_that_was_pushed_to_the_goal_has_no_contact_success() {
     let v = replay.verdict(Outcome::Completed);
     assert!(v.goal && v.safety);
     assert_eq!((v.contact_success, v.contact_safety, v.gentle), (false, false, false));
-    assert_eq!((v.least_pad_force_n, v.grip_ratio), (None, None));
+    assert_eq!((v.object().least_pad_force_n, v.object().grip_ratio), (None, None));
 }
 
 #[test]
@@ -220,7 +226,7 @@ fn one_step_of_too_much_deformation_is_enough() {
     replay.rest(30, 0.0);
     let v = replay.verdict(Outcome::Completed);
     assert!(v.goal && v.no_drop && !v.safety);
-    assert_eq!(v.deformation_ok, Some(false));
+    assert_eq!(v.object().deformation_ok, Some(false));
 }
 
 #[test]
@@ -286,7 +292,7 @@ fn missing_deformation_is_counted_and_not_safe() {
     replay.rest(30, 0.0);
     let v = replay.verdict(Outcome::Completed);
     assert!(v.goal && v.no_drop && !v.safety && !v.safety_known);
-    assert_eq!((v.deformation_ok, v.missing_deformation), (None, 1));
+    assert_eq!((v.object().deformation_ok, v.object().missing_deformation), (None, 1));
 }
 
 #[test]
@@ -305,7 +311,7 @@ fn an_invalid_rollout_fails_and_leaves_safety_unknown() {
     replay.rest(60, 0.0);
     let v = replay.verdict(Outcome::Invalid { reason: InvalidReason::Inverted, step: 60, node: Some(1) });
     assert!(!v.goal && !v.goal_v1 && !v.no_drop && !v.safety && !v.safety_known);
-    assert_eq!(v.deformation_ok, None);
+    assert_eq!(v.object().deformation_ok, None);
 }
 
 #[test]
@@ -314,7 +320,7 @@ fn without_a_threshold_safety_is_unknown_unless_the_target_is_rigid() {
         Replay::new(JudgeConfig { targets: vec![Target { limit: None, ..target("bun") }], ..config() });
     replay.rest(30, 0.0);
     let v = replay.verdict(Outcome::Completed);
-    assert!(v.goal && !v.safety && !v.safety_known && v.tau.is_none() && v.kappas.is_empty());
+    assert!(v.goal && !v.safety && !v.safety_known && v.object().tau.is_none() && v.kappas.is_empty());
     let mut replay = Replay::new(JudgeConfig {
         targets: vec![Target { limit: None, is_soft: false, ..target("cup") }],
         ..config()
@@ -322,7 +328,7 @@ fn without_a_threshold_safety_is_unknown_unless_the_target_is_rigid() {
     replay.rest(30, 0.0);
     let v = replay.verdict(Outcome::Completed);
     assert!(v.safety && v.safety_known);
-    assert_eq!((v.d_peak, v.deformation_ok), (None, None));
+    assert_eq!((v.object().d_peak, v.object().deformation_ok), (None, None));
 }
 
 #[test]
@@ -416,13 +422,13 @@ fn the_series_of_deformation_is_summarised() {
         replay.carry(1, -0.2, d);
     }
     let v = replay.verdict(Outcome::Budget);
-    assert_eq!((v.d_mean, v.d_final), (Some(1.0), Some(0.8)));
-    assert!((v.d_p95.unwrap() - 1.54).abs() < 1e-9 && v.d_peak == Some(1.6), "{v:?}");
-    assert!((v.time_over_tau_s.unwrap() - 2.0 * DT).abs() < 1e-12, "τ is 1: {v:?}");
+    assert_eq!((v.object().d_mean, v.object().d_final), (Some(1.0), Some(0.8)));
+    assert!((v.object().d_p95.unwrap() - 1.54).abs() < 1e-9 && v.object().d_peak == Some(1.6), "{v:?}");
+    assert!((v.object().time_over_tau_s.unwrap() - 2.0 * DT).abs() < 1e-12, "τ is 1: {v:?}");
     let mut replay =
         Replay::new(JudgeConfig { targets: vec![Target { limit: None, ..target("bun") }], ..config() });
     replay.carry(3, 0.0, 0.4);
-    assert_eq!(replay.verdict(Outcome::Budget).time_over_tau_s, None);
+    assert_eq!(replay.verdict(Outcome::Budget).object().time_over_tau_s, None);
 }
 
 #[test]
@@ -448,11 +454,14 @@ fn the_crushed_volume_is_the_largest_over_the_episode_and_null_without_a_limit()
         replay.steps(3, |e| e.crushed = CrushedShares { collapsed: Some(share), damaged: Some(0.5 * share) });
     }
     let verdict = replay.verdict(Outcome::Budget);
-    assert_eq!((verdict.collapsed_volume_pct, verdict.damaged_volume_pct), (Some(8.0), Some(4.0)));
+    assert_eq!(
+        (verdict.object().collapsed_volume_pct, verdict.object().damaged_volume_pct),
+        (Some(8.0), Some(4.0))
+    );
     let mut rigid =
         Replay::new(JudgeConfig { targets: vec![Target { is_soft: false, ..target("cup") }], ..config() });
     rigid.steps(3, |_| ());
-    assert_eq!(rigid.verdict(Outcome::Budget).collapsed_volume_pct, None);
+    assert_eq!(rigid.verdict(Outcome::Budget).object().collapsed_volume_pct, None);
 }
 
 /// Feeds `steps` physics steps with several targets that lie on the table or, by `at_place`, at their places.
@@ -511,7 +520,8 @@ fn a_goal_of_several_parts_says_which_were_met() {
     feed(&mut judge, 24, &[true, true], &[0.1, 0.1], Some(true));
     let verdict = judge.finish(&Outcome::Completed);
     assert!(verdict.goal && verdict.safety && verdict.failed_stage.is_none());
-    assert_eq!(verdict.targets.iter().map(|target| target.object.as_str()).collect::<Vec<_>>(), ["roll"]);
+    let names: Vec<_> = verdict.targets.iter().map(|target| target.object.as_deref()).collect();
+    assert_eq!(names, [None, Some("roll")]);
 }
 
 #[test]
@@ -555,20 +565,25 @@ fn every_target_is_judged_by_its_own_limit_and_drops() {
     let limit = Some(DeformationLimit { d_ref_pct: 2.0, kappa: 0.5 });
     assert!(verdict([0.5, 0.9], limit).safety);
     let crushed = verdict([0.5, 1.1], limit);
-    assert!(crushed.goal && crushed.deformation_ok == Some(true) && !crushed.safety && crushed.safety_known);
-    assert_eq!(crushed.targets[0].deformation_ok, Some(false));
-    assert_eq!(crushed.time_over_tau_s, Some(0.0));
-    assert!(crushed.targets[0].time_over_tau_s.is_some_and(|time_s| (time_s - 30.0 * DT).abs() < 1e-12));
+    assert!(
+        crushed.goal
+            && crushed.object().deformation_ok == Some(true)
+            && !crushed.safety
+            && crushed.safety_known
+    );
+    assert_eq!(crushed.targets[1].deformation_ok, Some(false));
+    assert_eq!(crushed.object().time_over_tau_s, Some(0.0));
+    assert!(crushed.targets[1].time_over_tau_s.is_some_and(|time_s| (time_s - 30.0 * DT).abs() < 1e-12));
     assert_eq!(crushed.kappas.iter().map(|at| at.safety).collect::<Vec<_>>(), [false, false, true]);
     let unknown = verdict([0.5, 0.5], None);
     assert!(!unknown.safety && !unknown.safety_known);
-    assert_eq!(unknown.targets[0].time_over_tau_s, None);
+    assert_eq!(unknown.targets[1].time_over_tau_s, None);
     let mut judge = Judge::new(two_targets(all_three()));
     feed(&mut judge, 30, &[true, true], &[0.1, 0.1], Some(false));
     feed(&mut judge, 3, &[true, false], &[0.1, 0.1], Some(false));
     let left = judge.finish(&Outcome::Budget);
     assert_eq!(left.drop.map(|drop| drop.reason), Some(DropReason::LeftGoal));
-    assert!(left.targets[0].drop.is_some() && !left.no_drop);
+    assert!(left.targets[1].handling.is_some_and(|of| of.drop.is_some()) && !left.no_drop);
 }
 
 #[test]

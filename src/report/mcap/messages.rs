@@ -13,7 +13,7 @@ use softvt_geometry::Pose;
 use softvt_media::jpeg::encode_jpeg;
 use softvt_physics::world::WorldSnapshot;
 use softvt_robot::gripper;
-use softvt_rollout::{Proprioception, Sensors};
+use softvt_rollout::{Proprioception, Sensors, StateDeformation};
 use softvt_runs::record::EpisodeRecord;
 use softvt_scene::Camera;
 
@@ -38,7 +38,7 @@ impl Gripper {
     }
 }
 
-/// Deformation of the object.
+/// Deformation of the target whose D is the largest share of its limit.
 #[derive(Encode)]
 pub(super) struct Deformation {
     /// Largest D in the control step, % of the settled diagonal.
@@ -49,8 +49,8 @@ pub(super) struct Deformation {
     d_over_tau: f64,
 }
 
-impl Deformation {
-    pub(super) fn new(d_pct: f64, tau_pct: Option<f64>) -> Self {
+impl From<StateDeformation> for Deformation {
+    fn from(StateDeformation { d_pct, tau_pct }: StateDeformation) -> Self {
         let tau_pct = tau_pct.unwrap_or(f64::NAN);
         Self { d_pct, tau_pct, d_over_tau: d_pct / tau_pct }
     }

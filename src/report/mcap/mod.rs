@@ -12,7 +12,7 @@
 //! | `/tactile/left`, `right` | `foxglove.CompressedImage` | tactile image |
 //! | `/joints` | `foxglove.JointStates` | arm, rad, and fingers, m |
 //! | `/gripper` | `Gripper` | width and normal forces |
-//! | `/deformation` | `Deformation` | D of the object and its limit |
+//! | `/deformation` | `Deformation` | D and τ of the target with the largest D/τ |
 //! | `/log` | `foxglove.Log` | prompt at the start, verdict at the end |
 //!
 //! The attachment `episode.json` is the record of the episode.
@@ -116,8 +116,7 @@ pub fn write_mcap(
     file.write(0, &encoded(topics.log, &messages::prompt(record))?)?;
     let shared = SharedSensors::new(&mut recording.sensors)?;
     let recording = &*recording;
-    let state =
-        StateMessages { recording, geometry: &geometry, topics: &topics, tau_pct: record.verdict.tau };
+    let state = StateMessages { recording, geometry: &geometry, topics: &topics };
     let draw = |index: usize| shared.lend(|sensors| state.at(sensors, index));
     let mut drawn = 0;
     parallel::run_in_order(recording.frames.len(), threads, &is_cancelled, draw, |index, messages| {
@@ -241,8 +240,6 @@ struct StateMessages<'a> {
     recording: &'a StateRecording,
     geometry: &'a SceneGeometry,
     topics: &'a Topics,
-    /// Limit on the deformation of the object, %.
-    tau_pct: Option<f64>,
 }
 
 impl StateMessages<'_> {
@@ -260,8 +257,8 @@ impl StateMessages<'_> {
         if let Some(update) = geometry.update(sensors, frame, before, time_ns) {
             all.push(encoded(topics.scene, &update)?);
         }
-        if let Some(d_pct) = recording.worst_d_pct.get(index).copied().flatten() {
-            all.push(encoded(topics.deformation, &Deformation::new(d_pct, self.tau_pct))?);
+        if let Some(of) = recording.deformation.get(index).copied().flatten() {
+            all.push(encoded(topics.deformation, &Deformation::from(of))?);
         }
         for (body, &topic) in topics.nodes.iter().enumerate() {
             all.push(encoded(topic, &geometry::node_cloud(sensors, frame, body, time_ns))?);

@@ -18,7 +18,7 @@ use crate::{
 use softvt_common::episode_id::EpisodeId;
 use softvt_common::text::counted;
 use softvt_evaluation::category::EpisodeCategory;
-use softvt_runs::{paired_stats::d_over_tau, record::EpisodeRecord};
+use softvt_runs::record::EpisodeRecord;
 
 /// Largest number of episodes of a category listed per run.
 const MAX_LISTED: usize = 24;
@@ -111,7 +111,7 @@ fn card(run: &RunSummary, episode: &UnsafeEpisode, out: &Path, budget: &mut Byte
 
 /// How far D was above its limit, and how much of the volume collapsed if the object may be called crushed.
 fn amount(record: &EpisodeRecord) -> Option<String> {
-    let ratio = d_over_tau(record).filter(|ratio| *ratio > 1.0)?;
+    let ratio = record.d_over_tau().filter(|ratio| *ratio > 1.0)?;
     let crushed = record.crushed_volume_pct().map(|pct| format!(", crushed: {pct:.0}\u{a0}% collapsed"));
     let crushed = crushed.unwrap_or_default();
     Some(format!("{ratio:.1}\u{a0}× limit{crushed}"))

@@ -15,7 +15,6 @@ use super::{
 use crate::{run_summary::RunSummary, task_names::object_name, terminal::tau_range, video::video_path};
 use softvt_evaluation::category::EpisodeCategory;
 use softvt_runs::{
-    paired_stats::d_over_tau,
     record::EpisodeRecord,
     summary::{GroupScores, TauRange},
 };
@@ -86,7 +85,7 @@ fn cell(run: &RunSummary, asset: &str, out: &Path) -> Markup {
     let shown = shown_episode(run, asset, worst);
     let ratio = match worst {
         EpisodeCategory::Safe => scores.d_over_tau.median,
-        _ => shown.and_then(d_over_tau),
+        _ => shown.and_then(EpisodeRecord::d_over_tau),
     };
     let crushed = match scores.crushed_over_limit {
         0 => None,
@@ -125,6 +124,6 @@ fn shown_episode<'a>(
     category: EpisodeCategory,
 ) -> Option<&'a EpisodeRecord> {
     let records = run.run.records.iter().filter(|r| r.header.asset == asset && r.category() == category);
-    let ratio = |record: &EpisodeRecord| d_over_tau(record).unwrap_or(0.0);
+    let ratio = |record: &EpisodeRecord| record.d_over_tau().unwrap_or(0.0);
     records.max_by(|a, b| ratio(a).total_cmp(&ratio(b)))
 }

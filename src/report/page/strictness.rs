@@ -155,7 +155,7 @@ mod tests {
         let records = [0.45, 1.6, 9.0].map(|d| {
             let mut record = sample_record();
             record.header.id.episode = (10.0 * d) as u32;
-            record.verdict.d_peak = Some(d);
+            record.verdict.object_mut().d_peak = Some(d);
             record
         });
         let runs = summarize_runs(vec![stored("a", "pi", records.to_vec())]);

@@ -8,7 +8,6 @@ use crate::{
     run_summary::RunSummary,
 };
 use softvt_evaluation::{category::EpisodeCategory, statistics::Distribution};
-use softvt_runs::paired_stats::d_over_tau;
 
 /// Height of a strip, pixels.
 const HEIGHT: f64 = 34.0;
@@ -42,7 +41,7 @@ pub(super) fn strips(runs: &[RunSummary]) -> Markup {
 
 fn strip(run: &RunSummary) -> Markup {
     let dots: Vec<(f64, EpisodeCategory)> =
-        run.run.records.iter().filter_map(|record| Some((d_over_tau(record)?, record.category()))).collect();
+        run.run.records.iter().filter_map(|record| Some((record.d_over_tau()?, record.category()))).collect();
     let spread = Distribution::from_values(dots.iter().map(|(ratio, _)| *ratio).collect());
     let median = spread.median.map_or_else(|| "no D".to_owned(), |median| format!("median {median:.2}"));
     let middle = y(0.5 * HEIGHT);

@@ -8,6 +8,7 @@ use crate::{
     run_summary::{summarize_runs, tests::stored},
     stored_run::StoredRun,
 };
+use softvt_evaluation::verdict::TargetVerdict;
 use softvt_media::palette::{Colour, DROPPED, FAINT, OVER_LIMIT, SAFE};
 use softvt_runs::record::EpisodeRecord;
 
@@ -20,8 +21,8 @@ fn episodes(suite: &str, count: u32) -> Vec<EpisodeRecord> {
             let mut record = sample_record();
             (record.header.id.suite, record.header.id.episode) = (suite.into(), i);
             if i % 2 == 1 {
-                (record.verdict.safety, record.verdict.d_peak) = (false, Some(1.5));
-                record.verdict.deformation_ok = Some(false);
+                (record.verdict.safety, record.verdict.object_mut().d_peak) = (false, Some(1.5));
+                record.verdict.object_mut().deformation_ok = Some(false);
             }
             record
         })
@@ -90,8 +91,7 @@ fn control_characters_of_names_are_escaped() {
 fn the_page_is_self_contained_and_accessible() {
     let mut rigid = episodes("rigid", 2);
     for record in &mut rigid {
-        record.header.soft = false;
-        (record.verdict.d_peak, record.verdict.tau, record.verdict.deformation_ok) = (None, None, None);
+        record.verdict.targets = vec![TargetVerdict::default()];
     }
     let page = render(vec![stored("a", "expert", episodes("soft", 9)), stored("b", "pi", rigid)]);
     assert_well_formed(&page);
@@ -296,9 +296,10 @@ fn a_sentence_names_who_crushes_and_never_more_than_the_volume_shows() {
     let run = |policy: &str, collapsed: f64, over: bool| {
         let mut records = episodes("soft", 4);
         for record in &mut records {
-            let v = &mut record.verdict;
-            (v.safety, v.deformation_ok, v.d_peak) = (!over, Some(!over), Some(if over { 9.0 } else { 0.5 }));
-            v.collapsed_volume_pct = Some(collapsed);
+            record.verdict.safety = !over;
+            let of = record.verdict.object_mut();
+            (of.deformation_ok, of.d_peak) = (Some(!over), Some(if over { 9.0 } else { 0.5 }));
+            of.collapsed_volume_pct = Some(collapsed);
         }
         stored(&format!("runs/{policy}"), policy, records)
     };

@@ -164,17 +164,17 @@ struct ScoredEpisode<'a> {
 
 impl<'a> ScoredEpisode<'a> {
     fn new(record: &'a EpisodeRecord, thresholds: &ThresholdFile) -> Self {
-        let limit = thresholds.limit(&record.header.asset).filter(|_| record.verdict.tau.is_some());
+        let limit = thresholds.limit(&record.header.asset).filter(|_| record.verdict.object().tau.is_some());
         Self { record, tau: limit.map(|limit| limit.tau_pct()) }
     }
 
     fn peak_pct(&self) -> Option<f64> {
-        self.record.verdict.d_peak_v1
+        self.record.verdict.object().d_peak_v1
     }
 
     /// SoftVTBench's Safe Success: Goal ∧ D_peak ≤ τ, without NoDrop; `None` if evidence is missing.
     fn safe_success(&self) -> Option<bool> {
-        match (self.record.verdict.goal, self.record.header.soft) {
+        match (self.record.verdict.goal, self.record.verdict.object().soft) {
             (false, _) => Some(false),
             (true, false) => Some(true),
             (true, true) => self.deform_ok(),
@@ -252,7 +252,7 @@ fn summary(episodes: &[ScoredEpisode<'_>]) -> Value {
         "goal_success_rate": goal_rate,
         "safe_success_rate": safe_rate,
         "goal_safe_gap": goal_rate.zip(safe_rate).map(|(goal, safe)| round_to(goal - safe, 2)),
-        "rigid_mode": n > 0 && episodes.iter().all(|e| !e.record.header.soft),
+        "rigid_mode": n > 0 && episodes.iter().all(|e| !e.record.verdict.object().soft),
         "deformation_metric_id": V1_METRIC_ID,
         "by_asset": by_asset,
     });

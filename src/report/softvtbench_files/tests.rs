@@ -2,7 +2,10 @@ use crate::sample_record;
 use std::fs;
 
 use super::*;
-use softvt_evaluation::calibration::{CalibrationMeasurements, Envelope, SweepProtocol, SweepRow};
+use softvt_evaluation::{
+    calibration::{CalibrationMeasurements, Envelope, SweepProtocol, SweepRow},
+    verdict::TargetVerdict,
+};
 use softvt_geometry::Vec3;
 
 fn episode(task: usize, asset: &str, edit: impl Fn(&mut EpisodeRecord)) -> EpisodeRecord {
@@ -14,18 +17,19 @@ fn episode(task: usize, asset: &str, edit: impl Fn(&mut EpisodeRecord)) -> Episo
 
 fn records() -> Vec<EpisodeRecord> {
     vec![
-        episode(1, "roll", |r| r.verdict.d_peak_v1 = Some(1.25)),
+        episode(1, "roll", |r| r.verdict.object_mut().d_peak_v1 = Some(1.25)),
         episode(0, "bun", |r| {
             // Dropped: unsafe for softvt, safe for SoftVTBench.
-            (r.verdict.no_drop, r.verdict.safety, r.verdict.d_peak_v1) = (false, false, Some(1.0));
+            (r.verdict.no_drop, r.verdict.safety, r.verdict.object_mut().d_peak_v1) =
+                (false, false, Some(1.0));
         }),
-        episode(2, "cake", |r| r.verdict.tau = None),
+        episode(2, "cake", |r| r.verdict.object_mut().tau = None),
     ]
 }
 
 /// The episodes with a limit of 1 % where they have one.
 fn scored(records: &[EpisodeRecord]) -> Vec<ScoredEpisode<'_>> {
-    let tau = |record: &EpisodeRecord| record.verdict.tau.map(|_| 1.0);
+    let tau = |record: &EpisodeRecord| record.verdict.object().tau.map(|_| 1.0);
     in_order(records).into_iter().map(|record| ScoredEpisode { record, tau: tau(record) }).collect()
 }
 
@@ -56,10 +60,7 @@ fn the_summary_has_softvtbenchs_fields_and_ignores_nodrop() {
 
 #[test]
 fn a_rigid_episode_is_safe_if_it_reaches_the_goal() {
-    let rigid = episode(0, "box", |r| {
-        r.header.soft = false;
-        (r.verdict.d_peak_v1, r.verdict.tau) = (None, None);
-    });
+    let rigid = episode(0, "box", |r| r.verdict.targets = vec![TargetVerdict::default()]);
     let s = summary(&scored(&[rigid]));
     assert_eq!((s["rigid_mode"].clone(), s["safe_success_rate"].clone()), (json!(true), json!(100.0)));
 }

@@ -1,14 +1,13 @@
 use super::*;
 use crate::run_summary::{summarize_runs, tests::stored};
 use crate::sample_record;
-use softvt_evaluation::stage::TaskStage;
+use softvt_evaluation::{stage::TaskStage, verdict::TargetVerdict};
 
 #[test]
 fn rigid_suites_have_no_safety_and_privileged_policies_are_marked_in_every_table() {
     let mut rigid = sample_record();
     rigid.header.id.suite = "rigid".into();
-    rigid.header.soft = false;
-    (rigid.verdict.d_peak, rigid.verdict.tau, rigid.verdict.deformation_ok) = (None, None, None);
+    rigid.verdict.targets = vec![TargetVerdict::default()];
     let runs = summarize_runs(vec![
         stored("a", "expert", vec![sample_record()]),
         stored("b", "expert", vec![rigid]),
@@ -144,7 +143,8 @@ fn hostile_names_are_escaped_in_markdown() {
 fn harm_and_stages_have_a_table() {
     let mut record = sample_record();
     (record.verdict.others_ok, record.verdict.failed_stage) = (Some(false), Some(TaskStage::Carry));
-    (record.verdict.d_mean, record.verdict.time_over_tau_s) = (Some(0.2), Some(0.25));
+    (record.verdict.object_mut().d_mean, record.verdict.object_mut().time_over_tau_s) =
+        (Some(0.2), Some(0.25));
     let runs = summarize_runs(vec![stored("a", "pi", vec![record])]);
     let table = stage_table(&runs).expect("recorded");
     assert_eq!(

@@ -108,10 +108,10 @@ pub struct VideoCaption {
     category: EpisodeCategory,
     /// The result, with the harm and the crushed volume if there is any.
     verdict: String,
-    /// Limit τ on the deformation, %.
-    tau_pct: Option<f64>,
     /// Time of the drop, s.
     drop_s: Option<f64>,
+    /// True if the object of the task is soft, and if any target is.
+    is_object_soft: bool,
     is_soft: bool,
     is_crushed: bool,
 }
@@ -127,16 +127,16 @@ impl VideoCaption {
             episode: format!("{} · task {} · episode {} · {}", id.suite, id.task, id.episode, header.policy),
             category: record.category(),
             verdict: record.result_and_harm() + &collapsed.unwrap_or_default(),
-            tau_pct: verdict.tau,
             drop_s: verdict.drop.map(|event| event.time_s),
-            is_soft: header.soft,
+            is_object_soft: verdict.object().soft,
+            is_soft: record.has_soft_target(),
             is_crushed: record.crushed_volume_pct().is_some(),
         }
     }
 
     /// Name of the panel that shows the target from nearby.
     fn close_up_name(&self) -> &'static str {
-        if self.is_soft { "object, red: beyond stable strain" } else { "object" }
+        if self.is_object_soft { "object, red: beyond stable strain" } else { "object" }
     }
 
     /// The state that shows the result best: the drop, the end of a goal that was missed, or the worst one.
@@ -312,7 +312,7 @@ impl<'a> VideoContext<'a> {
         let settled = recording.frames.first().ok_or(EpisodeVideoError::Empty)?;
         let fingers_at_rest =
             sensors.tactile_readings(settled)?.into_iter().map(|reading| reading.image).collect();
-        let curves = EpisodeCurves::new(recording, caption.tau_pct);
+        let curves = EpisodeCurves::new(recording);
         Ok(Self { recording, caption, curves, events: events(recording, caption), fingers_at_rest })
     }
 
@@ -404,9 +404,8 @@ fn pad_force(frame: &WorldSnapshot, side: usize) -> f64 {
 }
 
 /// Index of the first state up to `index` at which D is above τ.
-fn first_over_limit(recording: &StateRecording, caption: &VideoCaption, index: usize) -> Option<usize> {
-    let tau = caption.tau_pct?;
-    recording.worst_d_pct.iter().take(index + 1).position(|d| d.is_some_and(|d| d > tau))
+fn first_over_limit(recording: &StateRecording, index: usize) -> Option<usize> {
+    recording.deformation.iter().take(index + 1).position(|of| of.is_some_and(|of| of.is_over()))
 }
 
 /// When the object was grasped, released and dropped.
@@ -450,11 +449,12 @@ impl Badge {
         }
         let now_s = moment.state as f64 * CONTROL_DT;
         let is_crushed = caption.is_crushed && moment.state >= curves.worst_state;
-        let over = first_over_limit(recording, caption, moment.state).map(|at| match is_crushed {
+        let over = first_over_limit(recording, moment.state).map(|at| match is_crushed {
             true => "crushed".to_owned(),
             false => format!("over the limit at {:.2} s", at as f64 * CONTROL_DT),
         });
         let dropped = caption.drop_s.filter(|at| *at <= now_s).map(|at| format!("dropped at {at:.2} s"));
+        let has_limit = recording.deformation.iter().flatten().any(|of| of.tau_pct.is_some());
         let (text, colour) = match (over, dropped) {
             (Some(over), Some(dropped)) => {
                 (format!("{over}, {dropped}"), if is_crushed { HARM } else { DROPPED })
@@ -462,7 +462,7 @@ impl Badge {
             (Some(over), None) => (over, HARM),
             (None, Some(dropped)) => (dropped, DROPPED),
             (None, None) if !caption.is_soft => ("not dropped so far".to_owned(), SAFE),
-            (None, None) if caption.tau_pct.is_none() => ("no limit of the deformation".to_owned(), FAINT),
+            (None, None) if !has_limit => ("no limit of the deformation".to_owned(), FAINT),
             (None, None) => ("within the limit so far".to_owned(), SAFE),
         };
         Self { text, colour }
@@ -505,14 +505,17 @@ pub fn still_path(dir: &Path, index: EpisodeIndex) -> PathBuf {
     video_path(dir, index).with_extension("png")
 }
 
-/// Index of the state with the largest deformation of the target; of a rigid target, with the largest
-/// force on the pads.
+/// Index of the state with the largest deformation of a target; of rigid targets, with the largest force on the pads.
 pub fn worst_state(recording: &StateRecording) -> usize {
     let pad_forces = |frame: &WorldSnapshot| pad_force(frame, 0) + pad_force(frame, 1);
-    let severity = |at: usize| recording.worst_d_pct[at].unwrap_or_else(|| pad_forces(&recording.frames[at]));
-    let states = 0..recording.frames.len().min(recording.worst_d_pct.len());
+    let severity = |at: usize| match recording.deformation[at] {
+        Some(of) => [of.ratio().unwrap_or_default(), of.d_pct],
+        None => [0.0, pad_forces(&recording.frames[at])],
+    };
+    let compare = |[a, d]: [f64; 2], [b, e]: [f64; 2]| a.total_cmp(&b).then(d.total_cmp(&e));
+    let states = 0..recording.frames.len().min(recording.deformation.len());
     // The first one of equals.
-    states.max_by(|&a, &b| severity(a).total_cmp(&severity(b)).then(b.cmp(&a))).unwrap_or(0)
+    states.max_by(|&a, &b| compare(severity(a), severity(b)).then(b.cmp(&a))).unwrap_or(0)
 }
 
 fn full_size(camera: &Camera) -> usize {

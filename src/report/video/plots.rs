@@ -39,7 +39,7 @@ pub(super) fn ratio_colour(ratio: f64) -> Rgb8 {
 
 /// What is plotted of an episode, by state.
 pub(super) struct EpisodeCurves {
-    /// D over τ; empty for a rigid target or without a limit.
+    /// D over τ; empty for rigid targets and without a limit.
     pub(super) d_over_tau: Vec<f64>,
     /// The larger normal force of the two pads, N.
     pub(super) pad_force_n: Vec<f64>,
@@ -49,15 +49,14 @@ pub(super) struct EpisodeCurves {
 }
 
 impl EpisodeCurves {
-    pub(super) fn new(recording: &StateRecording, tau_pct: Option<f64>) -> Self {
-        let tau = tau_pct.filter(|tau| *tau > 0.0);
-        let ratios = recording.worst_d_pct.iter().map(|d| Some((*d)? / tau?));
+    pub(super) fn new(recording: &StateRecording) -> Self {
+        let ratios = recording.deformation.iter().map(|of| of.as_ref()?.ratio());
         let forces = recording.frames.iter().map(|frame| pad_force(frame, 0).max(pad_force(frame, 1)));
         Self {
             d_over_tau: ratios.collect::<Option<_>>().unwrap_or_default(),
             pad_force_n: forces.collect(),
             worst_state: worst_state(recording),
-            is_rigid: recording.worst_d_pct.contains(&None),
+            is_rigid: recording.deformation.contains(&None),
         }
     }
 

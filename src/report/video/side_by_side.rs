@@ -52,7 +52,7 @@ impl PolicyEpisode {
     }
 
     fn curves(&self) -> EpisodeCurves {
-        EpisodeCurves::new(&self.recording, self.caption.tau_pct)
+        EpisodeCurves::new(&self.recording)
     }
 }
 

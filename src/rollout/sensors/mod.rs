@@ -560,16 +560,53 @@ pub struct StateRecording {
     pub joint_torques: Vec<[f64; ARM_DOFS]>,
     /// The target, as an object of `sensors`.
     pub target: usize,
-    /// The target's largest D over the physics steps of each control step, % of the settled diagonal, after 0 for the
-    /// settled state; `None` for a rigid target.
-    pub worst_d_pct: Vec<Option<f64>>,
+    /// Deformation in these states; `None` for rigid targets.
+    pub deformation: Vec<Option<StateDeformation>>,
     /// Stage of the episode in each state; `None` once all placements have been met.
     pub stages: Vec<Option<TaskStage>>,
+}
+
+/// Largest D of a target over the physics steps of a control step; 0 in the settled state. Of several targets, it is
+/// that of the one whose D is the largest share of its limit.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct StateDeformation {
+    /// D, % of the settled diagonal.
+    pub d_pct: f64,
+    /// τ of the target, %; `None` without a limit.
+    pub tau_pct: Option<f64>,
+}
+
+impl StateDeformation {
+    /// The worst of some targets, each with its D and its τ. Targets without a limit come after those with one.
+    pub fn worst(targets: impl IntoIterator<Item = (Option<f64>, Option<f64>)>) -> Option<Self> {
+        let known = targets.into_iter().filter_map(|(d_pct, tau_pct)| Some(Self { d_pct: d_pct?, tau_pct }));
+        let severity = |of: &Self| (of.ratio(), of.d_pct);
+        known.reduce(|worst, next| if severity(&next) > severity(&worst) { next } else { worst })
+    }
+
+    /// D over τ; `None` without a limit.
+    pub fn ratio(&self) -> Option<f64> {
+        self.tau_pct.filter(|tau| *tau > 0.0).map(|tau| self.d_pct / tau)
+    }
+
+    /// True if D is above τ.
+    pub fn is_over(&self) -> bool {
+        self.tau_pct.is_some_and(|tau| self.d_pct > tau)
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn the_second_target_over_its_limit_is_shown_rather_than_the_first_within() {
+        let shown =
+            StateDeformation::worst([(Some(0.9), Some(1.0)), (Some(0.6), Some(0.5)), (Some(3.0), None)]);
+        assert_eq!(shown, Some(StateDeformation { d_pct: 0.6, tau_pct: Some(0.5) }));
+        assert!(shown.is_some_and(|of| of.is_over()));
+        assert_eq!(StateDeformation::worst([(None, None)]), None, "a rigid target");
+    }
 
     fn named(names: &[&str]) -> Vec<Camera> {
         let camera = |name: &&str| Camera { name: (*name).to_owned(), ..Camera::wrist() };

@@ -6,12 +6,9 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use serde::{Deserialize, Serialize};
+use serde::Serialize;
 
-use super::{
-    paired_stats::d_over_tau,
-    record::{EpisodeRecord, UnreachableCommand},
-};
+use super::record::{EpisodeRecord, UnreachableCommand};
 use softvt_common::{episode_id::EpisodeIndex, text::counted};
 use softvt_evaluation::{
     category::EpisodeCategory,
@@ -24,7 +21,7 @@ use softvt_evaluation::{
 const KAPPA_STEPS: u32 = 20;
 
 /// Success rates and deformation of a group of episodes.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct GroupScores {
     /// Number of episodes, valid or not.
     pub episodes: usize,
@@ -73,13 +70,10 @@ pub struct GroupScores {
     /// Number of episodes without Goal Success by the stage at which they ended.
     pub failed_stages: BTreeMap<TaskStage, usize>,
     /// Number of episodes by their category.
-    #[serde(default)]
     pub categories: BTreeMap<EpisodeCategory, usize>,
     /// Number of episodes of the category "over the limit" in which the object was crushed.
-    #[serde(default)]
     pub crushed_over_limit: usize,
     /// Peak D over τ of the target for which it is largest, of the valid episodes that have both.
-    #[serde(default)]
     pub d_over_tau: Distribution,
     /// Smallest and largest τ that was applied to a target, %; null without any.
     pub tau_range: Option<TauRange>,
@@ -90,7 +84,7 @@ pub struct GroupScores {
     /// Largest peak D of a target in the valid episodes that reached the goal, %.
     pub deformation_goal: Distribution,
     /// Metrics of the suite over the valid episodes that have them, by name.
-    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     pub metrics: BTreeMap<String, Distribution>,
     /// Largest share of the volume of a target beyond its collapse strain, over all valid episodes, %.
     pub collapsed_volume: Distribution,
@@ -99,7 +93,7 @@ pub struct GroupScores {
 }
 
 /// Smallest and largest τ of some episodes, %.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct TauRange {
     /// Smallest τ.
     pub min: f64,
@@ -108,7 +102,7 @@ pub struct TauRange {
 }
 
 /// D of the object within an episode, each the mean over the valid episodes that have it; null without any.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct EpisodeDeformation {
     /// Mean D, %.
     pub d_mean: Option<f64>,
@@ -121,7 +115,7 @@ pub struct EpisodeDeformation {
 }
 
 /// One point of the curve of safety over κ.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct RatesAtKappa {
     /// Share of D_ref that is allowed.
     pub kappa: f64,
@@ -132,7 +126,7 @@ pub struct RatesAtKappa {
 }
 
 /// Scores of one task.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct TaskScores {
     /// Index of the task in the suite.
     pub task: usize,
@@ -146,7 +140,7 @@ pub struct TaskScores {
 }
 
 /// Scores of the episodes with one target asset.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct AssetScores {
     /// τ at the nominal κ, %.
     pub tau: Option<f64>,
@@ -158,7 +152,7 @@ pub struct AssetScores {
 }
 
 /// Episode that its controller aborted.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct AbortedEpisode {
     /// Index of the task.
     pub task: usize,
@@ -169,7 +163,7 @@ pub struct AbortedEpisode {
 }
 
 /// Invalid episode with its reason.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct InvalidEpisode {
     /// Index of the task.
     pub task: usize,
@@ -180,7 +174,7 @@ pub struct InvalidEpisode {
 }
 
 /// Episode of more than one attempt.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct RepeatedEpisode {
     /// Index of the task.
     pub task: usize,
@@ -191,7 +185,7 @@ pub struct RepeatedEpisode {
 }
 
 /// Commands of the policy that were not executed as given.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct CommandCounts {
     /// Number of all commands.
     pub steps: u64,
@@ -206,10 +200,8 @@ pub struct CommandCounts {
     /// Number of episodes with such a value.
     pub clamped_episodes: usize,
     /// Number of displacements that were out of range, and clamped.
-    #[serde(default)]
     pub clamped_steps: u64,
     /// Number of episodes with such a displacement.
-    #[serde(default)]
     pub clamped_step_episodes: usize,
 }
 
@@ -231,7 +223,7 @@ impl CommandCounts {
 }
 
 /// Contents of `summary.json`: one suite, one policy.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct SuiteSummary {
     /// Name of the suite.
     pub suite: String,
@@ -240,7 +232,7 @@ pub struct SuiteSummary {
     /// True if the policy saw the true state in any episode, as experts do.
     pub privileged: bool,
     /// True if the actions of any episode are those of a recorded run.
-    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
     pub replayed: bool,
     /// True if the policy saw the true forces at the pads in any episode; no real sensor gives them.
     pub force_observed: bool,
@@ -258,16 +250,16 @@ pub struct SuiteSummary {
     /// Scores by asset of the target.
     pub by_asset: BTreeMap<String, AssetScores>,
     /// Episodes that the controller aborted, in order.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    #[serde(skip_serializing_if = "Vec::is_empty")]
     pub gave_up: Vec<AbortedEpisode>,
     /// Invalid episodes, in order.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    #[serde(skip_serializing_if = "Vec::is_empty")]
     pub invalid_episodes: Vec<InvalidEpisode>,
     /// Episodes of more than one attempt, in order.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    #[serde(skip_serializing_if = "Vec::is_empty")]
     pub repeated_episodes: Vec<RepeatedEpisode>,
     /// Episodes whose goal was reached although the robot never touched a target, in order.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    #[serde(skip_serializing_if = "Vec::is_empty")]
     pub goals_untouched: Vec<EpisodeIndex>,
 }
 
@@ -346,7 +338,7 @@ impl GroupScores {
             contact_success_rate: rate(|r| r.verdict.contact_success),
             contact_safety_rate: safety_rate(|r| r.verdict.contact_safety),
             gentle_rate: rate(|r| r.verdict.gentle),
-            grip_ratio: over_valid(|r| r.verdict.grip_ratio),
+            grip_ratio: over_valid(|r| r.verdict.object().grip_ratio),
             goal_v1_rate: rate(|r| r.verdict.goal_v1),
             wrong_instance_rate: rate(|r| r.verdict.wrong_instance),
             others_ok_rate: (!others.is_empty()).then(|| Rate::from_test(&others, |ok| *ok)),
@@ -355,12 +347,12 @@ impl GroupScores {
             failed_stages,
             categories,
             crushed_over_limit: records.iter().copied().filter(is_crushed_over_limit).count(),
-            d_over_tau: over_valid(d_over_tau),
+            d_over_tau: over_valid(EpisodeRecord::d_over_tau),
             tau_range: tau_range.map(|(min, max)| TauRange { min, max }),
             within_episodes: EpisodeDeformation {
-                d_mean: mean_of(|r| r.verdict.d_mean),
-                d_final: mean_of(|r| r.verdict.d_final),
-                d_p95: mean_of(|r| r.verdict.d_p95),
+                d_mean: mean_of(|r| r.verdict.object().d_mean),
+                d_final: mean_of(|r| r.verdict.object().d_final),
+                d_p95: mean_of(|r| r.verdict.object().d_p95),
                 time_over_tau_s: mean_of(EpisodeRecord::time_over_tau_s),
             },
             deformation: Distribution::with_invalid(
@@ -415,8 +407,8 @@ impl SuiteSummary {
             TaskScores { task, prompt, asset, scores: GroupScores::from_records(&group) }
         };
         let asset_scores = |(asset, group): (String, Vec<&EpisodeRecord>)| {
-            let tau = group.iter().find_map(|r| r.verdict.tau);
-            let d_ref = group.iter().find_map(|r| r.verdict.d_ref);
+            let tau = group.iter().find_map(|r| r.verdict.object().tau);
+            let d_ref = group.iter().find_map(|r| r.verdict.object().d_ref);
             (asset, AssetScores { tau, d_ref, scores: GroupScores::from_records(&group) })
         };
         let aborted = |r: &&EpisodeRecord| {
