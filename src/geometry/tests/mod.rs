@@ -2,6 +2,7 @@
 
 mod foreign_files;
 mod import;
+mod inputs;
 mod meshes;
 mod shapes;
 

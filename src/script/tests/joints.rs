@@ -38,86 +38,13 @@ fn open(text: &str) -> Result<Scene, String> {
 }
 
 #[test]
-fn a_joint_without_limits_or_with_wrong_ones_is_refused_at_its_line() {
-    let joint = |text: &str| error_of(&chest(text, ""));
-    assert_eq!(
-        joint("softvt.slider { axis = { 0, -1, 0 } }"),
-        "suites/x.lua:4: slider.lower: missing, as is upper; expected metres"
-    );
-    assert_eq!(
-        joint("softvt.hinge { axis = { 0, 0, 1 }, origin = { 0, 0, 0 },\nlower = -1 }"),
-        "suites/x.lua:4: hinge.upper: missing; expected radians in -6.2832..6.2832"
-    );
-    assert_eq!(
-        joint("softvt.slider { axis = { 0, -1, 0 }, lower = 0,\nupper = -0.1 }"),
-        "suites/x.lua:5: slider.upper: expected more than lower, 0, got -0.1"
-    );
-    assert_eq!(
-        joint("softvt.slider { lower = 0, upper = 1,\naxis = { 0, 0, 0 } }"),
-        "suites/x.lua:5: slider.axis: expected a direction, got one of length 0"
-    );
-    assert_eq!(
-        joint("softvt.slider { axis = { 0, 1, 0 }, lower = 0, upper = math.huge }"),
-        "suites/x.lua:4: slider.upper: expected metres, got inf, which is not a finite number"
-    );
-    assert_eq!(
-        joint("softvt.slider { axis = { 0, 1, 0 }, lower = 0, upper = 1, damping = -1 }"),
-        "suites/x.lua:4: slider.damping: expected a number (N s/m) of 0 or more, got -1"
-    );
-    assert!(
-        joint("{ axis = { 0, 1, 0 } }")
-            .contains("expected the result of softvt.slider{…} or softvt.hinge{…}")
-    );
-}
-
-#[test]
-fn parts_of_one_name_of_no_parent_and_in_a_circle_are_refused() {
-    let more = |name: &str, parent: &str| {
-        let rest = format!("shape = box, density = 500, joint = {SLIDER}");
-        error_of(&chest(
-            SLIDER,
-            &format!("{{ name = '{name}', {parent} {rest} }},\n{{ name = 'lid', parent = 'flap', {rest} }}"),
-        ))
-    };
-    assert_eq!(
-        more("drawer", ""),
-        "suites/x.lua:2: articulated.parts: there are two parts named \"drawer\"; names must be unique"
-    );
-    assert_eq!(
-        more("flp", ""),
-        "suites/x.lua:2: articulated.parts: part \"lid\": parent: unknown part \"flap\"; did you mean \"flp\"?"
-    );
-    assert_eq!(
-        more("flap", "parent = 'lid',"),
-        "suites/x.lua:2: articulated.parts: parts flap, lid carry each other in a circle; one must be carried by the base"
-    );
-    assert_eq!(
-        error_of("softvt.articulated { parts = {} }"),
-        "suites/x.lua:1: articulated.parts: expected at least one part; without any it is softvt.static {}"
-    );
-}
-
-#[test]
-fn start_values_are_those_given_and_must_lie_within_the_limits() {
+fn start_values_are_those_given_or_zero() {
     let add = |rest: &str| {
         let place = format!("scene:add {{ name = 'chest', asset = chest, at = {{ 0.1, 0 }}, {rest} }}");
         open(&suite(&chest(SLIDER, ""), &place)).map(|scene| scene.objects[0].joints.clone())
     };
     assert_eq!(add("joints = { drawer = 0.04 }"), Ok(vec![0.04]));
     assert_eq!(add(""), Ok(vec![0.0]));
-    assert_eq!(
-        add("joints = { drawer = 0.2 }").unwrap_err(),
-        "x.lua:9: scene:add.joints.drawer: expected a value in 0..0.1 (m), got 0.2"
-    );
-    assert_eq!(
-        add("joints = { draw = 0 }").unwrap_err(),
-        "x.lua:9: scene:add.joints: unknown part \"draw\"; did you mean \"drawer\"?"
-    );
-    let ball = "scene:add { name = 'chest', asset = ball, at = { 0, 0 }, joints = { drawer = 0 } }";
-    assert_eq!(
-        open(&suite(&chest(SLIDER, ""), ball)).unwrap_err(),
-        "x.lua:9: scene:add.joints: asset ball has no joints"
-    );
 }
 
 #[test]
@@ -129,11 +56,6 @@ fn objects_can_rest_on_a_moved_part() {
     let height = |index: usize| scene.objects[index].pose_w.translation.z;
     assert!((height(1) - 0.065).abs() < 1e-6, "on the drawer: {}", height(1));
     assert!((height(2) - 0.03).abs() < 1e-6, "next to it, on the base: {}", height(2));
-    let wrong = place.replace("chest.drawer", "chest.drawr");
-    assert_eq!(
-        open(&suite(&chest(SLIDER, ""), &wrong)).unwrap_err(),
-        "x.lua:10: scene:add: on: object \"chest\": unknown part \"drawr\"; did you mean \"drawer\"?"
-    );
 }
 
 #[test]

@@ -42,12 +42,6 @@ fn a_calibration_is_read_when_the_plan_is_made_and_no_later() {
         error(('%s %.2f %s'):format(c.window.extent_mm > 1, c.tau, softvt.calibration 'nothing_like_it'), 0)";
     let text = message_of(library);
     assert!(text.starts_with("true ") && text.ends_with(" nil"), "{text}");
-    let wrong = error_of("softvt.calibration '../x'");
-    assert!(wrong.contains("softvt.calibration: asset: expected a name"), "{wrong}");
-    let broken = [("suites/x.lua", "softvt.calibration 'odd'"), ("assets/calibration/odd.json", "{}")];
-    let message = Project::new(&broken).error("suites/x.lua", &[]);
-    assert!(message.contains("assets/calibration/odd.json: not a threshold file"), "{message}");
-
     let late = "local none = softvt.calibration 'absent'\n\
         return softvt.experiment { name = 'e', grid = { a = { 1 } }, run = function()\n\
         return { none = tostring(none), late = pcall(softvt.calibration, 'sphere') and 'given' or 'refused' } end }";

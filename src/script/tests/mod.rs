@@ -1,8 +1,8 @@
 //! The Lua interface as scripts use it, and the messages of its errors.
 
-mod bad_input;
 mod episodes;
-mod hostile;
+mod files_and_limits;
+mod inputs;
 mod joints;
 mod mass_and_calibration;
 mod options;

@@ -48,13 +48,6 @@ fn object<'a>(setup: &'a EpisodeSetup, name: &str) -> &'a Object {
     setup.scene.objects.iter().find(|object| object.name == name).expect("placed")
 }
 
-/// The error of a script at load or of its first episode, without the folder's name.
-fn refusal(rest: &str) -> String {
-    let project = project(rest);
-    let error = project.load("x.lua", &[]).and_then(|loaded| open(&loaded, 0, 0)).map(|_| ()).unwrap_err();
-    error.to_string().replace(&format!("{}/", project.path("").display()).replace("//", "/"), "")
-}
-
 #[test]
 fn an_object_is_placed_at_another_size() {
     let by_field = opened(
@@ -74,22 +67,6 @@ fn an_object_is_placed_at_another_size() {
     assert!((first.asset.hints["grasp_height_m"] - 0.036).abs() < 1e-12);
     assert_eq!(first.nominal.fingerprint(), object(&by_field, "right").asset.fingerprint());
     assert_eq!((first.scale, second.youngs_factor()), (1.2, Some(3.0)));
-}
-
-#[test]
-fn an_articulated_object_has_one_size() {
-    let cabinet = "local drawer = { name = 'drawer', shape = softvt.shape.box { size = { 0.05, 0.05, 0.05 } }:grounded(), density = 500,
-        joint = softvt.slider { axis = { 0, -1, 0 }, lower = 0, upper = 0.1 } }
-      local cabinet = softvt.asset { name = 'cabinet', shape = softvt.shape.box { size = { 0.2, 0.2, 0.01 } }:grounded(),
-        body = softvt.articulated { parts = { drawer } } }
-      return suite(function(scene) pair(scene, { uniform = function() return 0 end })
-        scene:add { name = 'cabinet', asset = cabinet, at = { 1, 0 }, scale = 1.1 } end)";
-    let message = refusal(cabinet);
-    assert!(
-        message.starts_with("x.lua:")
-            && message.contains("scene:add: scale: object \"cabinet\" is articulated"),
-        "{message}"
-    );
 }
 
 #[test]
@@ -169,40 +146,6 @@ fn the_standard_variation_applies_to_any_suite_of_soft_objects() {
     assert_eq!(suite.vary.as_ref(), Some(&ranges));
     let again = loaded.vary(&ranges).expect_err("it varies already").to_string();
     assert!(again.contains("suite test varies already"), "{again}");
-}
-
-#[test]
-fn what_cannot_vary_is_refused() {
-    let rigid = "return suite(function(scene) for k, name in ipairs { 'left', 'right' } do
-        scene:add { name = name, asset = rigid, at = { 0.1 * k, 0 } } end end, softvt.variation(ranges)";
-    let message = refusal(&format!("{rigid}, 'rigid')"));
-    assert!(
-        message.starts_with("x.lua:")
-            && message.contains("suite.vary: suite test has object_type = \"rigid\""),
-        "{message}"
-    );
-    let message = refusal(&format!("{rigid})"));
-    assert!(message.contains("layout \"pair\" of suite \"test\" has no soft object"), "{message}");
-    let message = refusal("ranges.size = { 1.1, 0.9 } return suite(pair, softvt.variation(ranges))");
-    assert!(
-        message.contains("variation.size: the smallest factor 1.1 comes first and is above 0.9"),
-        "{message}"
-    );
-    let message = refusal("ranges.size = nil return suite(pair, softvt.variation(ranges))");
-    assert!(message.starts_with("x.lua:") && message.contains("size"), "{message}");
-}
-
-#[test]
-fn an_object_that_no_hand_can_hold_is_refused_where_it_is_placed() {
-    let message = refusal("ranges.size = { 0.9, 1.5 } return suite(pair, softvt.variation(ranges))");
-    assert_eq!(
-        message,
-        "x.lua:21: object \"left\" is 90.0 mm wide where fingers grasp it, at 1.5 times the size of ball, and the gripper \
-         opens 80 mm; give a smaller scale"
-    );
-    let message =
-        refusal("return suite(function(scene, rng) pair(scene, rng) scene:object('left').scale = 1.4 end)");
-    assert!(message.contains("84.0 mm wide"), "{message}");
 }
 
 /// Checks `experts.blind_grips` in Lua against a search over numbers and other instances.
@@ -308,33 +251,6 @@ fn size_and_looks_do_not_depend_on_what_is_hidden() {
     assert!(plain.iter().all(|one| one.hidden.is_none()));
 }
 
-#[test]
-fn ranges_that_leave_no_instance_are_refused_with_the_remedy() {
-    let refusal = |change: &str| {
-        refusal(&format!("{HIDDEN} {change} return suite(placed(sphere), softvt.variation(ranges))"))
-    };
-    let message = refusal("ranges.hidden.window_ratio = { 900, 1000 }");
-    assert!(
-        message.contains("none of 10000 instances of asset sphere") && message.contains("widen"),
-        "{message}"
-    );
-    let message = refusal("ranges.hidden.window_ratio = { 0.5, 2 }");
-    assert!(message.starts_with("x.lua:") && message.contains("hidden.window_ratio"), "{message}");
-    let message = refusal("sphere = require 'assets.steamed_bun' ranges.hidden.staling = { 0.1, 0.1 }");
-    assert!(
-        message.contains("staling gives steamed_bun a strain of") && message.contains("above 1"),
-        "{message}"
-    );
-    let message = refusal("ranges.hidden.coating = { 1.5, 0.2 }");
-    assert!(message.contains("variation.hidden.coating: the smallest factor 1.5 comes first"), "{message}");
-    let message = refusal("sphere = soft");
-    assert!(
-        message.contains("asset ball has no calibrated window")
-            && message.contains("softvt scripts/calibrate.lua --asset ball"),
-        "{message}"
-    );
-}
-
 /// What does not show of each object of an episode, in the order of names.
 fn hidden_of(setup: EpisodeSetup) -> Vec<HiddenProperties> {
     let objects = setup.variation.expect("varied").objects;
@@ -382,7 +298,7 @@ fn instances_without_a_safe_grip_by_the_calibration_are_drawn() {
 
 #[test]
 fn the_hidden_suites_draw_the_published_instances() {
-    let drawn = |suite: &str| -> Vec<String> {
+    let drawn = |suite: &str| -> String {
         let project = Project::new(&[("x.lua", &format!("return require 'suites.{suite}'"))]);
         let limits = VmLimits { load: Duration::from_secs(10), ..limits() };
         let loaded = project.load_with("x.lua", &[], &limits).unwrap_or_else(|error| panic!("{error}"));
@@ -391,39 +307,14 @@ fn the_hidden_suites_draw_the_published_instances() {
             let setup = EpisodeSetup::open(&loaded, &id, &SceneChanges::default()).expect("an episode");
             let properties = hidden_of(setup).into_iter().map(|one| {
                 let HiddenProperties { aeration, staling, filling, coating, draws, .. } = one;
-                format!("{aeration:.3} {staling:.3} {filling:.3} {coating:.3} {draws}")
+                format!("aeration {aeration:.3} staling {staling:.3} filling {filling:.3} coating {coating:.3} draws {draws}")
             });
-            properties.collect::<Vec<_>>().join(", ")
+            properties.collect::<Vec<_>>().join(", ") + "\n"
         };
         (0..10).map(line).collect()
     };
-    assert_eq!(drawn("object_hidden"), OBJECT_HIDDEN);
-    assert_eq!(drawn("spatial_hidden"), SPATIAL_HIDDEN);
+    // They change only if the rule of the draws does, which makes published results incomparable.
+    for suite in ["object_hidden", "spatial_hidden"] {
+        insta::assert_snapshot!(suite, drawn(suite));
+    }
 }
-
-/// Aeration, staling, filling, coating and number of draws of the soft objects of the first episode of each task. They
-/// change only if the rule of the draws does, which makes published results incomparable.
-const OBJECT_HIDDEN: [&str; 10] = [
-    "2.345 1.610 3.865 0.335 72",
-    "0.646 2.938 2.618 0.278 71",
-    "1.441 5.185 2.173 0.257 59",
-    "0.531 1.101 3.201 0.431 117",
-    "0.820 1.480 1.226 0.234 3",
-    "0.620 1.581 2.721 0.306 34",
-    "0.900 1.245 1.603 0.490 16",
-    "1.305 3.196 1.698 0.238 9",
-    "0.509 4.431 1.383 0.217 34",
-    "1.764 5.217 3.667 0.340 4",
-];
-const SPATIAL_HIDDEN: [&str; 10] = [
-    "0.618 1.766 2.454 0.313 26, 0.911 1.447 2.333 0.242 1",
-    "0.677 1.133 2.479 0.331 90, 0.687 3.042 2.853 0.315 4",
-    "2.320 1.353 3.793 0.388 10, 1.308 4.510 2.138 0.238 18",
-    "1.542 2.009 1.798 0.235 9, 1.242 1.413 1.820 0.291 18",
-    "0.598 2.068 1.872 0.217 73, 1.246 1.256 3.637 0.223 7",
-    "0.538 3.922 2.649 0.286 24, 1.021 1.815 3.534 0.241 79",
-    "0.522 1.229 2.531 0.304 111, 0.542 1.055 2.501 0.332 167",
-    "0.544 1.874 2.466 0.278 21, 0.514 5.551 3.464 0.300 18",
-    "0.661 2.041 1.296 0.268 3, 0.839 2.670 1.348 0.223 95",
-    "0.871 4.348 1.795 0.228 88, 1.476 3.282 3.172 0.286 15",
-];

@@ -1,0 +1,7 @@
+-- Files that declare no profile.
+---
+return {}
+
+return softvt.profile {
+  nam = 'mine',
+}
