@@ -12,8 +12,8 @@ use std::{
 
 use clap::{Args, ValueEnum, value_parser};
 
-use crate::{error::CliError, output::Console, plan_flags};
-use softvt_benchmark::{ShiftValue, Suite, Task, Teacher};
+use crate::{error::CliError, output::Console, parse::ScriptOptions};
+use softvt_benchmark::{Plan, ShiftValue, Suite, Task, Teacher};
 use softvt_common::text::is_control;
 use softvt_dataset::{OptionalStream, card::KeptOutcome};
 use softvt_policy::{profile::GripCode, remote::ServerProtocol};
@@ -32,18 +32,14 @@ pub(crate) struct ScriptArgs {
     /// Script that returns the plan: a suite, a list of suites, conditions or an experiment
     #[arg(value_name = "FILE.lua")]
     pub file: PathBuf,
-    /// Values of the options that the script declares, as `--name=value`. Filled in after parsing.
-    #[arg(skip)]
-    pub options: Vec<String>,
-    /// Identifiers of the arguments of the command that are given. Filled in after parsing.
-    #[arg(skip)]
-    pub given: Vec<String>,
+    #[command(flatten)]
+    pub options: ScriptOptions,
     /// Base seed
     #[arg(long, value_name = "S", default_value = "0", allow_hyphen_values = true, value_parser = parse_seed)]
     pub seed: u64,
     /// File with the secret base seed of a judged run: docs/policies.md#judged-runs
-    #[arg(long, value_name = "FILE", conflicts_with = "seed")]
-    pub seed_file: Option<PathBuf>,
+    #[arg(long = "seed-file", value_name = "FILE", conflicts_with = "seed")]
+    pub secret: Option<PathBuf>,
     /// Scene changes that the suite declares, such as stiffness=0.5
     #[arg(long = "shift", value_name = "NAME=VALUE", value_delimiter = ',')]
     pub shifts: Vec<String>,
@@ -122,65 +118,35 @@ impl RunFlags {
     }
 }
 
-/// A configuration, and the identifiers of the arguments that were given for it.
-pub(crate) struct Request {
-    pub config: RunConfig,
-    pub given: Vec<String>,
-}
-
-impl Request {
-    /// The script and the changes of its scenes.
+impl ScriptArgs {
+    /// The configuration of the script and the changes of its scenes.
     ///
     /// # Errors
     /// A shift or setting that is not `NAME=VALUE`, or a seed file that cannot be read.
-    pub(crate) fn new(script: ScriptArgs) -> Result<Self, CliError> {
-        let observer = Arc::new(Console::default());
-        let secret = script.seed_file.as_deref().map(read_secret).transpose()?;
-        let in_file = |error: CliError| error.prefixed(script.file.display());
-        let shifts = script.shifts.iter().map(|word| parse_shift(word)).collect::<Result<_, _>>();
-        let settings = script.settings.iter().map(|word| parse_pair("--set", word)).collect::<Result<_, _>>();
-        let (shifts, settings): (Vec<ShiftValue>, Vec<(String, String)>) =
-            (shifts.map_err(in_file)?, settings.map_err(in_file)?);
-        refuse_repeated("--shift", shifts.iter().map(|shift| shift.name.as_str())).map_err(in_file)?;
-        refuse_repeated("--set", settings.iter().map(|(path, _)| path.as_str())).map_err(in_file)?;
-        let config = RunConfig {
+    pub(crate) fn config(self) -> Result<RunConfig, CliError> {
+        let secret = self.secret.as_deref().map(read_secret).transpose()?;
+        let changes = || -> Result<(Vec<ShiftValue>, Vec<(String, String)>), CliError> {
+            let shifts: Vec<ShiftValue> =
+                self.shifts.iter().map(|word| parse_shift(word)).collect::<Result<_, _>>()?;
+            let settings = self.settings.iter().map(|word| parse_pair("--set", word));
+            let settings: Vec<(String, String)> = settings.collect::<Result<_, _>>()?;
+            refuse_repeated("--shift", shifts.iter().map(|shift| shift.name.as_str()))?;
+            refuse_repeated("--set", settings.iter().map(|(path, _)| path.as_str()))?;
+            Ok((shifts, settings))
+        };
+        let (shifts, settings) = changes().map_err(|error| error.prefixed(self.file.display()))?;
+        Ok(RunConfig {
             shifts,
             settings,
-            seed: script.seed,
+            seed: self.seed,
             secret,
-            rigid_twin: script.rigid_twin,
-            file: script.file,
-            options: script.options,
-            vary: script.vary,
-            observer,
+            rigid_twin: self.rigid_twin,
+            file: self.file,
+            options: self.options.words,
+            vary: self.vary,
+            observer: Arc::new(Console::default()),
             ..RunConfig::default()
-        };
-        Ok(Self { config, given: script.given })
-    }
-
-    /// With a changed configuration.
-    pub(crate) fn with(self, change: impl FnOnce(RunConfig) -> RunConfig) -> Self {
-        Self { config: change(self.config), ..self }
-    }
-
-    /// Loads the script and refuses flags of `command` that would do nothing for its plan.
-    ///
-    /// # Errors
-    /// The script fails or returns no plan; a flag without effect.
-    pub(crate) fn load(&self, command: &str) -> Result<ConfiguredScript, CliError> {
-        let config = self.config.clone();
-        let loaded = config.load_script()?;
-        plan_flags::check(command, self, &loaded.plan)?;
-        Ok(ConfiguredScript { script: config.prepare_script(loaded)?, config })
-    }
-
-    /// Loads the script, refuses flags of `command` that would do nothing for its plan, and then loads the policy.
-    ///
-    /// # Errors
-    /// The script fails or returns no plan; a flag without effect; a policy that cannot be loaded.
-    pub(crate) fn load_plan(self, command: &str, policy: &PolicyArgs) -> Result<ConfiguredScript, CliError> {
-        let ConfiguredScript { config, script } = self.load(command)?;
-        Ok(ConfiguredScript { config: config.with_policy(PolicyConfig::load(&policy.options())?), script })
+        })
     }
 }
 
@@ -217,8 +183,8 @@ pub(crate) struct ConnectionArgs {
     #[arg(long, value_name = "N", value_parser = parse_count::<u16>)]
     replan: Option<u16>,
     /// Timeout in seconds, for connecting and for each reply [default: 60]
-    #[arg(long, value_name = "SECONDS", value_parser = parse_timeout)]
-    policy_timeout: Option<Duration>,
+    #[arg(long = "policy-timeout", value_name = "SECONDS", value_parser = parse_timeout)]
+    timeout: Option<Duration>,
 }
 
 // What a policy sees and how it answers, wherever it runs. A doc comment would replace the description of the commands.
@@ -249,7 +215,7 @@ impl ConnectionArgs {
         PolicyOptions {
             protocol: self.protocol,
             replan: self.replan,
-            timeout: self.policy_timeout,
+            timeout: self.timeout,
             ..self.profile.options()
         }
     }
@@ -266,29 +232,24 @@ impl ComparedPolicyArgs {
     /// cannot be loaded.
     pub(crate) fn load(&self) -> Result<Vec<PolicyConfig>, CliError> {
         let (options, count) = (self.connection.options(), self.policies.len());
-        if count <= 1 {
-            let source = self.policies.first().cloned().unwrap_or_default();
-            return Ok(vec![PolicyConfig::load(&PolicyOptions { source, ..options })?]);
-        }
         if count > Self::MAX_POLICIES {
             let most = Self::MAX_POLICIES;
-            let message = format!(
+            return Err(CliError::input(format!(
                 "--policy: expected at most {most} policies side by side, got {count}; leave some out"
-            );
-            return Err(CliError::input(message));
+            )));
         }
         if let Some(again) = (1..count).find(|at| self.policies[..*at].contains(&self.policies[*at])) {
             let word = self.policies[again].word();
-            let message = format!("--policy {word}: named twice; name each policy once");
-            return Err(CliError::input(message));
+            return Err(CliError::input(format!("--policy {word}: named twice; name each policy once")));
         }
-        if options.name.is_some() {
+        if count > 1 && options.name.is_some() {
             let message = "--name: applies to one policy; leave it out, and each is shown under its own name";
             return Err(CliError::input(message));
         }
+        let policies = if count == 0 { &[PolicySource::default()][..] } else { &self.policies };
         let load = |options| Ok(PolicyConfig::load(&options)?);
         let mut loaded: Vec<PolicyConfig> =
-            options.shared_by(&self.policies).into_iter().map(load).collect::<Result<_, CliError>>()?;
+            options.shared_by(policies)?.into_iter().map(load).collect::<Result<_, CliError>>()?;
         let names: Vec<String> = loaded.iter().map(|policy| policy.name.clone()).collect();
         for (number, policy) in (1..).zip(&mut loaded) {
             if names.iter().filter(|name| **name == policy.name).count() > 1 {
@@ -307,27 +268,34 @@ impl PolicyArgs {
 
     /// The policy and its options.
     pub(crate) fn options(&self) -> PolicyOptions {
-        PolicyOptions { source: self.policy.clone().unwrap_or_default(), ..self.connection.options() }
+        PolicyOptions { policy: self.policy.clone().unwrap_or_default(), ..self.connection.options() }
     }
 
-    /// Loads the policy of a check, which needs no server for its profile.
+    /// The script with the policy of a check, which needs no server for its profile.
     ///
     /// # Errors
     /// A policy or profile that cannot be loaded, or an option without effect.
-    pub(crate) fn checked(&self) -> Result<PolicyConfig, CliError> {
+    pub(crate) fn checked(&self, run: ConfiguredScript) -> Result<ConfiguredScript, CliError> {
         let of_profile = self.connection.profile.options();
-        if self.policy.is_some() || of_profile.profile.is_none() {
-            return Ok(PolicyConfig::load(&self.options())?);
+        if self.policy.is_some()
+            || of_profile.profile.is_none()
+            || matches!(run.script.plan, Plan::Experiment { .. })
+        {
+            return Ok(run.with_policy(&self.options())?);
         }
         // Options that act on servers only.
-        PolicyConfig::load(&PolicyOptions { profile: None, gripper: None, name: None, ..self.options() })?;
-        Ok(PolicyConfig::client(&of_profile, false)?)
+        let others = PolicyOptions { profile: None, gripper: None, name: None, ..self.options() };
+        let run = run.with_policy(&others)?;
+        Ok(ConfiguredScript {
+            config: run.config.with_policy(PolicyConfig::client(&of_profile, false)?),
+            ..run
+        })
     }
 
     /// The options for a suite of a teacher, which `--policy` replaces.
     pub(crate) fn taught_by(&self, teacher: Teacher) -> PolicyOptions {
-        let source = self.policy.clone().unwrap_or_else(|| teacher.into());
-        PolicyOptions { source, ..self.options() }
+        let policy = self.policy.clone().unwrap_or_else(|| teacher.into());
+        PolicyOptions { policy, ..self.options() }
     }
 
     /// The grip code that exports of a recording use. Policies that are neither servers nor in Lua have none of their
@@ -372,17 +340,16 @@ pub(crate) enum ImageStorage {
 }
 
 impl RecordingArgs {
-    /// The recording, and the configuration of its attempts under the expert.
+    /// The configuration of the attempts under the expert.
     ///
     /// # Errors
-    /// A shift or setting that is not valid.
-    pub(crate) fn request(&self, script: ScriptArgs, tasks: Vec<String>) -> Result<Request, CliError> {
-        if script.seed_file.is_some() {
+    /// A shift or setting that is not valid, or a secret seed.
+    pub(crate) fn config(&self, script: ScriptArgs, tasks: Vec<String>) -> Result<RunConfig, CliError> {
+        if script.secret.is_some() {
             let what = "demonstrations are public, and so need no secret seed; use --seed";
             return Err(CliError::input(format!("--seed-file: {what}")));
         }
-        let threads = self.threads;
-        Ok(Request::new(script)?.with(|config| RunConfig { tasks, threads, ..config }))
+        Ok(RunConfig { tasks, threads: self.threads, ..script.config()? })
     }
 
     /// The recording, with the grip code of exports that name none.

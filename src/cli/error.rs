@@ -2,6 +2,7 @@
 
 use std::error::Error;
 
+use crate::parse::clap_command;
 use softvt_common::cancel;
 use softvt_runner::{RunError, RunErrorCause};
 
@@ -50,19 +51,13 @@ impl<E: Error + 'static> From<E> for CliError {
     }
 }
 
-/// The flag that sets a field of the arguments, of the configuration of a run or of its policy.
-pub(crate) fn flag_of(field: &str) -> String {
-    let name = match field {
-        "tasks" => "task",
-        "selected_episodes" => "episode",
-        "settings" => "set",
-        "shifts" => "shift",
-        "requirements" => "require",
-        "secret" => "seed-file",
-        "timeout" => "policy-timeout",
-        other => other,
-    };
-    format!("--{}", name.replace('_', "-"))
+/// The flag that sets a field of the configuration of a run or of its policy: the arguments have the same names.
+fn flag_of(field: &str) -> String {
+    let root = clap_command();
+    let commands = std::iter::once(&root).chain(root.get_subcommands());
+    let mut args = commands.flat_map(clap::Command::get_arguments);
+    let long = args.find(|arg| arg.get_id() == field).and_then(clap::Arg::get_long);
+    format!("--{}", long.unwrap_or(field))
 }
 
 impl CliError {

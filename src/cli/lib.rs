@@ -10,7 +10,6 @@ mod commands;
 mod error;
 mod output;
 mod parse;
-mod plan_flags;
 #[cfg(test)]
 mod tests;
 

@@ -3,11 +3,11 @@
 use std::{collections::BTreeSet, path::Path};
 
 use clap::{
-    Arg, ArgMatches, Args, CommandFactory, FromArgMatches, Subcommand, error::ErrorKind, parser::ValueSource,
+    Arg, ArgGroup, ArgMatches, Args, CommandFactory, FromArgMatches, Subcommand, error::ErrorKind,
+    parser::ValueSource,
 };
 
 use super::{
-    args::ScriptArgs,
     commands::{Command, run::RunArgs},
     error::CliError,
     output::{print, print_table, terminal_format},
@@ -52,17 +52,11 @@ pub(super) fn parse(words: &[String]) -> Result<Option<Command>, CliError> {
             return Err(in_file(usage_error(&message)));
         }
     };
-    let innermost = innermost(&matches);
     let parsed = match matches.subcommand_name() {
         Some(_) => Command::from_arg_matches(&matches),
         None => RunArgs::from_arg_matches(&matches).map(|args| Command::Run(Box::new(args))),
     };
-    let mut command = parsed.map_err(|error| in_file(usage_error(&error.to_string())))?;
-    if let Some(script) = command.script_mut() {
-        script.options = given_options(innermost, &options);
-        script.given = given_ids(innermost);
-    }
-    Ok(Some(command))
+    parsed.map(Some).map_err(|error| in_file(usage_error(&error.to_string())))
 }
 
 /// The whole command, without options of a script.
@@ -99,20 +93,51 @@ fn collect_flags<'a>(command: &'a clap::Command, flags: &mut BTreeSet<&'a str>) 
     command.get_subcommands().for_each(|subcommand| collect_flags(subcommand, flags));
 }
 
-/// Adds `args` to a command and its subcommands, where they have [`ScriptArgs`].
+/// Adds `args` to a command and its subcommands, where they have [`ScriptOptions`].
 fn with_script_args(command: clap::Command, args: &[Arg]) -> clap::Command {
     let command = command.mut_subcommands(|subcommand| with_script_args(subcommand, args));
-    let takes_script =
-        command.get_groups().any(|group| Some(group.get_id()) == ScriptArgs::group_id().as_ref());
+    let takes_script = command.get_groups().any(|group| group.get_id() == ScriptOptions::GROUP);
     if takes_script { command.args(args) } else { command }
 }
 
-/// Start of the identifier of a script's option among the arguments; a colon cannot occur in those of the commands.
-const SCRIPT_ARG: &str = "script:";
+/// The options of a script that are given, as `--name=value`. A command that has this part of its arguments takes the
+/// options of its script.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct ScriptOptions {
+    pub words: Vec<String>,
+}
 
-/// Identifier of a script's option among the arguments.
-fn script_arg_id(option: &OptionSpec) -> String {
-    format!("{SCRIPT_ARG}{}", option.name)
+impl ScriptOptions {
+    const GROUP: &str = "script-options";
+    /// Start of the identifier of a script's option among the arguments; a colon cannot occur in those of the commands.
+    const PREFIX: &str = "script:";
+}
+
+impl Args for ScriptOptions {
+    fn augment_args(command: clap::Command) -> clap::Command {
+        command.group(ArgGroup::new(Self::GROUP).multiple(true))
+    }
+
+    fn augment_args_for_update(command: clap::Command) -> clap::Command {
+        Self::augment_args(command)
+    }
+}
+
+impl FromArgMatches for ScriptOptions {
+    fn from_arg_matches(matches: &ArgMatches) -> Result<Self, clap::Error> {
+        let given = matches.ids().map(clap::Id::as_str).filter_map(|id| {
+            let flag = id.strip_prefix(Self::PREFIX)?;
+            let is_given = matches.value_source(id) == Some(ValueSource::CommandLine);
+            let value = matches.get_one::<String>(id).filter(|_| is_given)?;
+            Some(format!("{flag}={value}"))
+        });
+        Ok(Self { words: given.collect() })
+    }
+
+    fn update_from_arg_matches(&mut self, matches: &ArgMatches) -> Result<(), clap::Error> {
+        *self = Self::from_arg_matches(matches)?;
+        Ok(())
+    }
 }
 
 fn script_arg(option: &OptionSpec, help: &str) -> Arg {
@@ -120,7 +145,7 @@ fn script_arg(option: &OptionSpec, help: &str) -> Arg {
         ScriptOptionValue::Text(text) => format!("{text:?}"),
         other => other.to_string(),
     };
-    let arg = Arg::new(script_arg_id(option))
+    let arg = Arg::new(format!("{}{}", ScriptOptions::PREFIX, option.flag()))
         .long(option.flag().trim_start_matches("--").to_owned())
         .help(escape_control(&format!("{help} [{}; default {default}]", option.expects())).into_owned())
         .help_heading("Options of the script");
@@ -131,31 +156,6 @@ fn script_arg(option: &OptionSpec, help: &str) -> Arg {
         _ if option.unit.is_empty() => arg.num_args(1).allow_hyphen_values(true).value_name("VALUE"),
         _ => arg.num_args(1).allow_hyphen_values(true).value_name("NUMBER"),
     }
-}
-
-/// The options of the script that are given, as `--name=value`.
-fn given_options(matches: &ArgMatches, options: &[OptionSpec]) -> Vec<String> {
-    let given = options.iter().filter_map(|option| {
-        let id = script_arg_id(option);
-        let value = matches.try_get_one::<String>(&id).ok().flatten().filter(|_| is_given(matches, &id))?;
-        Some(format!("{}={value}", option.flag()))
-    });
-    given.collect()
-}
-
-/// Identifiers of the arguments that are given, without options of the script.
-fn given_ids(matches: &ArgMatches) -> Vec<String> {
-    let ids = matches.ids().map(|id| id.as_str());
-    ids.filter(|id| !id.starts_with(SCRIPT_ARG) && is_given(matches, id)).map(str::to_owned).collect()
-}
-
-fn is_given(matches: &ArgMatches, id: &str) -> bool {
-    matches.value_source(id) == Some(ValueSource::CommandLine)
-}
-
-/// Matches of the innermost subcommand.
-fn innermost(matches: &ArgMatches) -> &ArgMatches {
-    matches.subcommand().map_or(matches, |(_, matches)| innermost(matches))
 }
 
 /// Formats a message of clap: without `error:` and without pairs of empty lines.
@@ -243,9 +243,9 @@ mod tests {
             "serve x.lua",
             "dataset import x.lua a.hdf5 --out made",
         ] {
-            let mut command =
-                with_option("gap_mm", &format!("{words} --gap-mm=3")).expect(words).expect(words);
-            assert_eq!(command.script_mut().expect(words).options, ["--gap-mm=3"], "{words}");
+            let command = with_option("gap_mm", &format!("{words} --gap-mm=3")).expect(words).expect(words);
+            let parsed = format!("{command:?}");
+            assert!(parsed.contains(r#"ScriptOptions { words: ["--gap-mm=3"] }"#), "{words}: {parsed}");
         }
     }
 

@@ -10,14 +10,15 @@ use std::{
 };
 
 use crate::{
+    effect::differing_fields,
     episode_artifacts::EpisodeFilter,
     error::RunError,
     observer::{JobList, Observer, SilentObserver},
-    policy::PolicyConfig,
+    policy::{PolicyConfig, PolicyOptions},
     stored_scripts::StoredScripts,
 };
 use softvt_benchmark::{
-    ShiftValue, Suite,
+    ObjectType, Plan, ShiftValue, Suite,
     run_changes::{RunChanges, Twin},
     seed::SecretSeed,
 };
@@ -100,6 +101,32 @@ pub struct ConfiguredScript {
     pub config: RunConfig,
     /// The script, loaded as the configuration says.
     pub script: LoadedScript,
+}
+
+impl ConfiguredScript {
+    /// The script with another policy, which is loaded.
+    ///
+    /// # Errors
+    /// A policy that cannot be loaded, or options for a plan without a policy.
+    pub fn with_policy(self, options: &PolicyOptions) -> Result<Self, RunError> {
+        if let plan @ Plan::Experiment { .. } = &self.script.plan {
+            self.config.check_no_policy(options, plan_noun(plan))?;
+        }
+        Ok(Self { config: self.config.with_policy(PolicyConfig::load(options)?), ..self })
+    }
+}
+
+/// Name of a plan in messages.
+pub fn plan_noun(plan: &Plan) -> &'static str {
+    let is_rigid = plan.suites().iter().all(|suite| suite.object_type == ObjectType::Rigid);
+    match plan {
+        Plan::Suite(_) if is_rigid => "a suite of rigid objects",
+        Plan::Suite(_) => "a suite",
+        Plan::Suites { .. } if is_rigid => "a list of suites of rigid objects",
+        Plan::Suites { .. } => "a list of suites",
+        Plan::Conditions { .. } => "a set of conditions",
+        Plan::Experiment { .. } => "an experiment",
+    }
 }
 
 /// Configuration of the runs of a script. The default runs the expert on all episodes of the suites as they are.
@@ -191,28 +218,81 @@ impl RunConfig {
     /// Loads the script with its options, its variation and the secret.
     ///
     /// # Errors
-    /// The script fails or returns no plan.
+    /// The script fails or returns no plan, or a field of the configuration has no effect on its plan.
     pub fn load(self) -> Result<ConfiguredScript, RunError> {
-        let script = self.prepare_script(self.load_script()?)?;
-        Ok(ConfiguredScript { script, config: self })
+        let script = match &self.stored_scripts {
+            Some(stored) => stored.load(&self.options)?,
+            None => softvt_script::load(&self.file, &self.options)?,
+        };
+        let read = self.read_by(&script.plan);
+        self.check_read(&read, plan_noun(&script.plan))?;
+        Ok(ConfiguredScript { script: read.prepare_script(script)?, config: read })
     }
 
-    /// Loads the script with its options. [`Self::prepare_script`] makes it ready for the run.
+    /// The part of the configuration that a plan reads, with which it is run; the rest is at its defaults.
+    fn read_by(&self, plan: &Plan) -> Self {
+        let config = self.clone();
+        let is_soft = |suite: &Suite| suite.object_type == ObjectType::Deformable;
+        match plan {
+            // It runs no episodes.
+            Plan::Experiment { .. } => {
+                let Self { file, options, seed, settings, threads, out, .. } = config;
+                let Self { resume, stored_scripts, observer, .. } = config;
+                let defaults = Self::default();
+                Self {
+                    file,
+                    options,
+                    seed,
+                    settings,
+                    threads,
+                    out,
+                    resume,
+                    stored_scripts,
+                    observer,
+                    ..defaults
+                }
+            }
+            _ => Self { rigid_twin: config.rigid_twin && plan.suites().iter().any(is_soft), ..config },
+        }
+    }
+
+    /// Checks that the part `read` of the configuration is all that differs from the defaults. `user` names what reads
+    /// it, as messages do.
     ///
     /// # Errors
-    /// The script fails or returns no plan.
-    pub fn load_script(&self) -> Result<LoadedScript, RunError> {
-        match &self.stored_scripts {
-            Some(stored) => stored.load(&self.options),
-            None => Ok(softvt_script::load(&self.file, &self.options)?),
-        }
+    /// A field without effect.
+    pub fn check_read(&self, read: &Self, user: impl fmt::Display) -> Result<(), RunError> {
+        let unread = differing_fields!(
+            self,
+            read,
+            Self {
+                file, options, seed, secret, shifts, settings, rigid_twin, vary, tasks, episodes,
+                selected_episodes, shard, threads, trace, video, mcap, out, resume;
+                policy, stored_scripts, observer
+            }
+        );
+        unread.first().map_or(Ok(()), |field| Err(self.no_effect(field, user)))
+    }
+
+    /// Checks that there are no options of a policy, since `user` has none.
+    ///
+    /// # Errors
+    /// An option of a policy.
+    pub fn check_no_policy(&self, options: &PolicyOptions, user: impl fmt::Display) -> Result<(), RunError> {
+        let given = options.differing(&PolicyOptions::default());
+        given.first().map_or(Ok(()), |option| Err(self.no_effect(option, user)))
+    }
+
+    /// An error about a field or an argument that `user` does not read.
+    pub fn no_effect(&self, field: &'static str, user: impl fmt::Display) -> RunError {
+        self.error_of(field, "", format!("has no effect on {user}; leave it out"))
     }
 
     /// A loaded script with the secret, whose suites vary as the configuration says.
     ///
     /// # Errors
     /// A variation that is not valid, or does not fit a suite.
-    pub fn prepare_script(&self, mut loaded: LoadedScript) -> Result<LoadedScript, RunError> {
+    pub(crate) fn prepare_script(&self, mut loaded: LoadedScript) -> Result<LoadedScript, RunError> {
         if let Some(file) = &self.vary {
             let (ranges, files) = softvt_script::load_variation(file)
                 .map_err(|error| RunError::from(error).in_setting("vary", ""))?;

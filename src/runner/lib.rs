@@ -7,10 +7,12 @@
 #![warn(missing_docs, unreachable_pub)]
 
 mod attempts;
-pub mod catalog;
+pub mod bench_growth;
+pub mod bench_rates;
 mod check;
 pub mod conditions;
 mod config;
+mod effect;
 mod episode_artifacts;
 mod episode_list;
 pub mod episode_selector;
@@ -19,20 +21,19 @@ mod evaluate;
 pub mod experiment;
 mod experiment_folder;
 mod friction;
-mod golden;
-pub mod growth;
+mod golden_episode;
 pub mod import;
 mod limits;
 mod observer;
 mod policy;
 pub mod policy_check;
-pub mod rates;
 mod record;
 mod recorded_runs;
 pub mod recording;
 pub mod replay;
 mod run_manifest;
 mod runner;
+pub mod script_catalog;
 pub mod selection;
 mod served_runs;
 mod serving;
@@ -42,12 +43,12 @@ mod suite_run;
 mod thumbnails;
 
 pub use check::SuiteChecker;
-pub use config::{ConfiguredScript, RunConfig, Shard, TraceDetail, read_secret, thread_count};
+pub use config::{ConfiguredScript, RunConfig, Shard, TraceDetail, plan_noun, read_secret, thread_count};
 pub use episode_artifacts::EpisodeFilter;
 pub use episode_list::{EpisodeJob, EpisodeList};
 pub use error::{FaultySetting, RunError, RunErrorCause};
 pub use evaluate::SuiteResult;
-pub use golden::GoldenEpisode;
+pub use golden_episode::GoldenEpisode;
 pub use observer::{Observer, SilentObserver};
 pub use policy::{
     BuiltinPolicy, ControllerFactory, DeclaredStreams, PolicyConfig, PolicyOptions, PolicySource,

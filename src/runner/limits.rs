@@ -101,36 +101,50 @@ impl CalibrationFiles {
         let mut found = SceneLimits::default();
         for object in scene.objects.iter().filter(|object| matches!(object.asset.body, Body::Soft(_))) {
             found.assets.insert(object.nominal.name.clone());
-            match self.limit_of(object)? {
+            match self.limit_of(object, targets.contains(&object.name.as_str()))? {
                 Ok(limit) => {
                     found.by_object.insert(object.name.clone(), limit);
                     found.judged.insert(object.nominal.name.clone());
                 }
-                Err(missing) => {
-                    found.missing.push(missing.describe(object, targets.contains(&object.name.as_str())))
-                }
+                Err(message) => found.missing.push(message),
             }
         }
         Ok(found)
     }
 
-    fn limit_of(&self, object: &Object) -> Result<Result<DeformationLimit, MissingLimit>, RunError> {
+    /// The limit of an object, or the message with the remedy if it has none.
+    fn limit_of(
+        &self,
+        object: &Object,
+        is_target: bool,
+    ) -> Result<Result<DeformationLimit, String>, RunError> {
         let asset = &object.nominal;
-        let Some(file) = self.file(&asset.name)? else {
-            return Ok(Err(MissingLimit::NotCalibrated { path: relative_path(&asset.name) }));
+        let name = &asset.name;
+        let effect = match is_target {
+            true => "its episodes cannot be judged safe",
+            false => "harm to it cannot be judged (others_ok is null)",
         };
-        let path = file.path.clone();
-        match file.thresholds.fingerprints.get(&asset.name) {
-            None => return Ok(Err(MissingLimit::NoFingerprint { path })),
-            Some(calibrated) if *calibrated != asset.fingerprint() => {
-                return Ok(Err(MissingLimit::OtherVersion { path }));
-            }
-            Some(_) => {}
-        }
-        if let Some(change) = object.departure() {
-            return Ok(Err(MissingLimit::OtherObject { change }));
-        }
-        Ok(file.limit(object).ok_or(MissingLimit::NoStableRow { path }))
+        let remedy = format!("{effect}; calibrate it: softvt scripts/calibrate.lua --asset {name}");
+        let Some(file) = self.file(name)? else {
+            return Ok(Err(format!("{name} is not calibrated (no {}): {remedy}", relative_path(name))));
+        };
+        let path = &file.path;
+        Ok(match (file.thresholds.fingerprints.get(name), object.departure()) {
+            (None, _) => Err(format!(
+                "{path} has no fingerprint of {name:?}, so that it may be of a different version: {remedy}"
+            )),
+            (Some(calibrated), _) if *calibrated != asset.fingerprint() => Err(format!(
+                "{path} was computed for a different version of {name:?} (its shape, material or friction differ): {remedy}"
+            )),
+            (Some(_), Some(change)) => Err(format!(
+                "no limit for object {:?}: it has {change} of asset {name:?}, which makes it another object: {effect}; \
+                 define an asset of its own and calibrate it",
+                object.name
+            )),
+            (Some(_), None) => file.limit(object).ok_or_else(|| {
+                format!("{path} has no limit for {name:?}, since no row of its sweep is stable: {remedy}")
+            }),
+        })
     }
 
     /// The calibration file of an asset, if there is one.
@@ -168,53 +182,14 @@ impl CalibrationFiles {
     /// Tells the messages of a scene about missing limits, each once per run.
     pub(crate) fn report(&self, index: EpisodeIndex, limits: &SceneLimits) {
         for message in &limits.missing {
-            if lock(&self.reported).insert(message.clone()) {
-                self.observer.notice(&format!("{index}: {message}"));
-            }
+            self.report_once(message, &format!("{index}: {message}"));
         }
     }
-}
 
-/// Reason why an object has no limit.
-#[derive(Debug)]
-enum MissingLimit {
-    NotCalibrated { path: String },
-    NoFingerprint { path: String },
-    OtherVersion { path: String },
-    OtherObject { change: String },
-    NoStableRow { path: String },
-}
-
-impl MissingLimit {
-    /// The message to the user, with the remedy.
-    fn describe(&self, object: &Object, is_target: bool) -> String {
-        let name = &object.nominal.name;
-        let effect = match is_target {
-            true => "its episodes cannot be judged safe",
-            false => "harm to it cannot be judged (others_ok is null)",
-        };
-        let calibrate = format!("calibrate it: softvt scripts/calibrate.lua --asset {name}");
-        match self {
-            Self::NotCalibrated { path } => {
-                format!("{name} is not calibrated (no {path}): {effect}; {calibrate}")
-            }
-            Self::NoFingerprint { path } => format!(
-                "{path} has no fingerprint of {name:?}, so that it may be of a different version: {effect}; {calibrate}"
-            ),
-            Self::OtherVersion { path } => format!(
-                "{path} was computed for a different version of {name:?} (its shape, material or friction differ): \
-                 {effect}; {calibrate}"
-            ),
-            Self::OtherObject { change } => format!(
-                "no limit for object {:?}: it has {change} of asset {name:?}, which makes it another object: {effect}; \
-                 define an asset of its own and calibrate it",
-                object.name
-            ),
-            Self::NoStableRow { path } => {
-                format!(
-                    "{path} has no limit for {name:?}, since no row of its sweep is stable: {effect}; {calibrate}"
-                )
-            }
+    /// Tells `text`, which has a message, unless the message was told before.
+    fn report_once(&self, message: &str, text: &str) {
+        if lock(&self.reported).insert(message.to_owned()) {
+            self.observer.notice(text);
         }
     }
 }
@@ -229,14 +204,8 @@ pub(crate) struct LimitScan {
     scenes: usize,
     assets: BTreeSet<String>,
     judged: BTreeSet<String>,
-    missing: BTreeMap<String, Affected>,
-}
-
-/// Scenes with the same missing limit.
-#[derive(Debug)]
-struct Affected {
-    first: EpisodeIndex,
-    count: usize,
+    /// Messages about missing limits, with the scenes concerned.
+    missing: BTreeMap<String, Vec<EpisodeIndex>>,
 }
 
 impl LimitScan {
@@ -245,24 +214,20 @@ impl LimitScan {
         self.assets.extend(limits.assets);
         self.judged.extend(limits.judged);
         for message in limits.missing.into_iter().collect::<BTreeSet<_>>() {
-            let affected = self.missing.entry(message).or_insert(Affected { first: index, count: 0 });
-            affected.count += 1;
+            self.missing.entry(message).or_default().push(index);
         }
     }
 
     /// Tells each missing limit, and the episodes concerned unless all are.
     pub(crate) fn report(&self, files: &CalibrationFiles) {
-        for (message, Affected { first, count }) in &self.missing {
-            if !lock(&files.reported).insert(message.clone()) {
-                continue;
-            }
-            let others = match count - 1 {
+        for (message, scenes) in &self.missing {
+            let others = match scenes.len() - 1 {
                 0 => String::new(),
                 others => format!(" and {}", counted(others, "other episode")),
             };
-            match *count == self.scenes {
-                true => files.observer.notice(message),
-                false => files.observer.notice(&format!("{first}{others}: {message}")),
+            match scenes.len() == self.scenes {
+                true => files.report_once(message, message),
+                false => files.report_once(message, &format!("{}{others}: {message}", scenes[0])),
             }
         }
     }

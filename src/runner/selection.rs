@@ -147,7 +147,7 @@ pub(crate) fn check_episodes(config: &RunConfig, suites: &[Suite]) -> Result<(),
         check_filter(config, suite, "video", config.video.as_ref())?;
         check_filter(config, suite, "mcap", config.mcap.as_ref())?;
     }
-    for suite in suites.iter().filter(|_| config.policy.is_recorded()) {
+    for suite in suites.iter().filter(|_| config.policy.recorded().is_some()) {
         let jobs = select_episodes(config, suite, &select_tasks(config, suite)?);
         find_replay_source(config, suite, &jobs, EpisodeSplit::Validation)?;
     }

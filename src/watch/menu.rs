@@ -30,7 +30,7 @@ impl Menu {
 
 /// Names of the policies that are offered: `given`, the built-in ones, and that of whoever drives the arm.
 pub(crate) fn policies(given: &str) -> Vec<String> {
-    let others = BuiltinPolicy::ALL.map(BuiltinPolicy::name).into_iter().chain([TELEOP]);
+    let others = BuiltinPolicy::all().map(BuiltinPolicy::name).chain([TELEOP]);
     let others = others.filter(|name| *name != given);
     iter::once(given).chain(others).map(str::to_owned).collect()
 }

@@ -60,6 +60,6 @@ fn a_twin_of_a_rigid_suite_is_refused() {
     let text = Small::default().text().replace("\"deformable\"", "\"rigid\"");
     assert_eq!(
         Project::new(&[("x.lua", &text)]).refusal("check x.lua --rigid-twin"),
-        "x.lua: --rigid-twin: the objects of this suite are rigid already; leave it out"
+        "x.lua: --rigid-twin: has no effect on a suite of rigid objects; leave it out"
     );
 }

@@ -163,7 +163,7 @@ fn the_policy_and_the_profile_of_the_page_work() {
     let check = |flags: &str| project.softvt(&format!("check suites/object_soft.lua --profile {flags}"));
     assert!(check("my_profile.lua").err.contains("inputs: unknown camera \"side\""));
     assert_eq!(check("third.lua").code, 0);
-    assert!(check("third.lua --replan 4").err.contains("--replan: applies to policy servers"));
+    assert!(check("third.lua --replan 4").err.contains("--replan: has no effect on the policy"));
 }
 
 /// Commands that run an embedded suite or script.

@@ -57,11 +57,8 @@ fn settings_and_seed_reach_the_simulations_of_an_experiment() {
         ("--set physics.dt=-1", "physics.dt"),
         ("--set physics.dt=0.01 --set physics.dt=0.02", "--set physics.dt: is given twice; give it once"),
         ("--set criteria.slip_m=0.1", "--set criteria.slip_m: an experiment judges no episodes"),
-        (
-            "--shift mass=2",
-            "--shift: applies to suites, lists of suites, conditions, and this file is an experiment",
-        ),
-        ("--vary", "--vary: applies to suites, lists of suites, conditions, and this file is an experiment"),
+        ("--shift mass=2", "--shift: has no effect on an experiment"),
+        ("--vary", "--vary: has no effect on an experiment"),
     ] {
         let refused = project.refusal(&format!("x.lua {words}"));
         assert!(refused.contains(part), "{refused}");

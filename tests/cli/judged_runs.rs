@@ -37,7 +37,7 @@ fn seed_files_that_are_no_secret_are_refused() {
         ("x.lua --seed-file secret --seed 1", "cannot be used with"),
         ("record x.lua --seed-file secret --out d", "--seed-file: demonstrations are public"),
         ("replay x 0 --seed-file none", "--seed-file none: there is no such file"),
-        ("scripts/rest_check.lua --seed-file secret", "--seed-file: applies to "),
+        ("scripts/rest_check.lua --seed-file secret", "--seed-file: has no effect on an experiment"),
     ] {
         let output = project.softvt(words);
         assert_eq!(output.code, 2, "{words}");

@@ -58,16 +58,10 @@ fn the_grip_code_of_a_run_is_printed() {
 fn flags_without_effect_and_unknown_policies_are_refused() {
     let project = policy_project(WANDERS);
     for (words, output) in [
-        (
-            "--policy noop --replan 3",
-            "--replan: applies to policy servers and Lua policies only; the policy noop ignores it",
-        ),
-        ("--protocol vla-eval", "--protocol: applies to policy servers only; the policy expert ignores it"),
-        ("--policy random --profile vision", "--profile: applies to policy servers only"),
-        (
-            "--policy noop --gripper binary",
-            "--gripper: applies to policy servers and Lua policies only; the policy noop",
-        ),
+        ("--policy noop --replan 3", "--replan: has no effect on the policy noop"),
+        ("--protocol vla-eval", "--protocol: has no effect on the policy expert"),
+        ("--policy random --profile vision", "--profile: has no effect on the policy"),
+        ("--policy noop --gripper binary", "--gripper: has no effect on the policy noop"),
         ("--policy q.lua", "q.lua: no such file"),
         ("--policy ws://127.0.0.1:99999", "\"99999\" is not a port"),
         ("--policy wss://host:1", "use a tunnel"),

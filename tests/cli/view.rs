@@ -134,7 +134,7 @@ fn views_of_policies_that_cannot_be_compared_are_refused() {
     for (flags, message) in [
         ("--policy noop --policy noop", "--policy noop: named twice; name each policy once"),
         ("--policy noop --policy random --name a", "--name: applies to one policy"),
-        ("--policy noop --policy random --replan 2", "the policy noop ignores it"),
+        ("--policy noop --policy random --replan 2", "has no effect on the policy noop, random"),
         (
             "--policy noop --policy random --policy expert --policy drives --policy one-force",
             "--policy: expected at most 4 policies side by side, got 5",

@@ -341,8 +341,8 @@ fn what_cannot_be_shown_is_refused() {
     for (words, expected) in [
         (format!("watch x.lua --port {port}"), "choose another, or 0 for any free port"),
         ("watch x.lua --task nothing".to_owned(), "nothing"),
-        ("watch run --seed 3".to_owned(), "--seed has no effect on the run run; leave it out"),
-        ("watch run --policy noop".to_owned(), "--policy has no effect on the run run; leave it out"),
+        ("watch run --seed 3".to_owned(), "--seed: has no effect on the run run; leave it out"),
+        ("watch run --policy noop".to_owned(), "--policy: has no effect on the run run; leave it out"),
         ("watch run --task cube".to_owned(), "--task: expected the index"),
         ("watch none.lua".to_owned(), "none.lua"),
         ("watch none".to_owned(), "none: no such file or folder; give a Lua file or a run folder"),

@@ -231,16 +231,10 @@ fn options_without_effect_are_refused() {
     let vision =
         project.run("x.lua").policy("random").with_policy(|policy| policy.profile = Some("vision".into()));
     for (run, output) in [
-        (
-            noop().replan(3),
-            "replan: applies to policy servers and Lua policies only; the policy noop ignores it",
-        ),
-        (protocol, "protocol: applies to policy servers only; the policy expert ignores it"),
-        (vision, "profile: applies to policy servers only"),
-        (
-            noop().gripper(GripCode::Binary),
-            "gripper: applies to policy servers and Lua policies only; the policy noop",
-        ),
+        (noop().replan(3), "replan: has no effect on the policy noop"),
+        (protocol, "protocol: has no effect on the policy expert"),
+        (vision, "profile: has no effect on the policy"),
+        (noop().gripper(GripCode::Binary), "gripper: has no effect on the policy noop"),
         (project.run("x.lua").policy("q.lua"), "q.lua: no such file"),
         (project.run("x.lua").policy("profile.lua"), "profile.lua:"),
         (

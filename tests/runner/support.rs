@@ -178,7 +178,7 @@ impl Run<'_> {
         let found = self.project.found(word);
         let is_path = BuiltinPolicy::named(word).is_none() && found.exists();
         let word = if is_path { found.display().to_string() } else { word.to_owned() };
-        self.with_policy(|policy| policy.source = word.parse().expect("a policy"))
+        self.with_policy(|policy| policy.policy = word.parse().expect("a policy"))
     }
 
     /// By a profile: a name, or a file of the project.

@@ -10,8 +10,8 @@ use crate::{
 };
 use softvt_common::files::replace;
 use softvt_runner::{
-    growth,
-    rates::{self, MachineRates},
+    bench_growth,
+    bench_rates::{self, MachineRates},
     thread_count,
 };
 
@@ -46,11 +46,11 @@ pub(super) fn run(args: &BenchArgs) -> Result<(), CliError> {
     let threads = thread_count(args.threads);
     let (table, file) = match &args.growth {
         Some(_) => {
-            let curves = growth::measure(&published.script, threads, on_stage)?;
-            (growth::table(&curves), growth::plot(&curves))
+            let curves = bench_growth::measure(&published.script, threads, on_stage)?;
+            (bench_growth::table(&curves), bench_growth::plot(&curves))
         }
         None => {
-            let rates = rates::measure(&published.script, threads, on_stage)?;
+            let rates = bench_rates::measure(&published.script, threads, on_stage)?;
             (rates.table_beside(&published), serde_json::to_string_pretty(&rates)? + "\n")
         }
     };

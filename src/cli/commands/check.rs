@@ -3,14 +3,14 @@
 use clap::Args;
 
 use crate::{
-    args::{PolicyArgs, Request, ScriptArgs, parse_count},
+    args::{PolicyArgs, ScriptArgs, parse_count},
     error::CliError,
     output::{eprint_notice, print},
 };
 use softvt_benchmark::{Plan, REFERENCE, Suite};
 use softvt_common::text::{self, counted};
 use softvt_runner::{
-    ConfiguredScript, SuiteChecker, conditions, experiment, selection::check_distinct_out_dirs,
+    ConfiguredScript, RunConfig, SuiteChecker, conditions, experiment, selection::check_distinct_out_dirs,
 };
 
 /// Check a script without running it
@@ -21,9 +21,9 @@ pub(crate) struct CheckArgs {
     pub(super) script: ScriptArgs,
     #[command(flatten)]
     policy: PolicyArgs,
-    /// Episodes per task whose scenes are checked
-    #[arg(long, value_name = "N", default_value_t = 1, value_parser = parse_count::<u32>)]
-    episodes: u32,
+    /// Episodes per task whose scenes are checked [default: 1]
+    #[arg(long, value_name = "N", value_parser = parse_count::<u32>)]
+    episodes: Option<u32>,
 }
 
 /// Loads a script, builds the scenes of the first episodes of every task and lets their objects settle. Nothing is run
@@ -32,8 +32,8 @@ pub(crate) struct CheckArgs {
 /// # Errors
 /// The first thing that is not valid.
 pub(super) fn run(args: CheckArgs) -> Result<(), CliError> {
-    let ConfiguredScript { config, script } = Request::new(args.script)?.load("check")?;
-    let run = ConfiguredScript { config: config.with_policy(args.policy.checked()?), script };
+    let config = RunConfig { episodes: args.episodes, ..args.script.config()? };
+    let run = args.policy.checked(config.load()?)?;
     let ConfiguredScript { config, script: loaded } = &run;
     let plan = &loaded.plan;
     check_distinct_out_dirs(config, plan.suites())?;
@@ -44,7 +44,9 @@ pub(super) fn run(args: CheckArgs) -> Result<(), CliError> {
     }
     let checker = SuiteChecker::new(&run);
     for suite in plan.suites() {
-        checker.check(suite, args.episodes, |warning| eprint_notice(format!("warning: {warning}")))?;
+        checker.check(suite, args.episodes.unwrap_or(1), |warning| {
+            eprint_notice(format!("warning: {warning}"))
+        })?;
         print_tasks(suite)?;
     }
     match plan {

@@ -58,7 +58,7 @@ fn check_answers(args: &DoctorArgs, dataset: &Path) -> Result<(), CliError> {
     } else {
         print(&check.text())?
     }
-    match check.findings.is_empty() {
+    match check.agrees() {
         true => Ok(()),
         false => {
             Err(CliError::new(Exit::Policy, "the answers of the policy do not agree with the demonstrations"))

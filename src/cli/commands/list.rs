@@ -8,7 +8,7 @@ use crate::{
     output::{print, print_json},
 };
 use softvt_common::text::TextTable;
-use softvt_runner::catalog::{self, Listing};
+use softvt_runner::script_catalog::{self, Listing};
 
 /// List suites, tasks, assets, policies, profiles or settings
 #[derive(Args, Debug)]
@@ -37,12 +37,12 @@ enum ListKind {
 /// A suite in the working folder cannot be loaded; the others are listed.
 pub(super) fn run(args: &ListArgs) -> Result<(), CliError> {
     let Listing { rows, errors } = match args.what {
-        ListKind::Suites => catalog::suites(),
-        ListKind::Tasks => catalog::tasks(),
-        ListKind::Assets => catalog::assets().into(),
-        ListKind::Policies => catalog::policies().into(),
-        ListKind::Profiles => catalog::profiles().into(),
-        ListKind::Settings => catalog::settings().into(),
+        ListKind::Suites => script_catalog::suites(),
+        ListKind::Tasks => script_catalog::tasks(),
+        ListKind::Assets => script_catalog::assets().into(),
+        ListKind::Policies => script_catalog::policies().into(),
+        ListKind::Profiles => script_catalog::profiles().into(),
+        ListKind::Settings => script_catalog::settings().into(),
     };
     if args.json {
         print_json(&rows)?

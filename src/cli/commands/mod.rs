@@ -19,7 +19,7 @@ mod watch;
 
 use clap::Subcommand;
 
-use super::{args::ScriptArgs, error::CliError};
+use super::error::CliError;
 
 // A doc comment would replace the description of the program.
 #[derive(Debug, Subcommand)]
@@ -65,20 +65,6 @@ impl Command {
             Self::Bench(args) => bench::run(&args),
             Self::Cache(args) => cache::run(&args),
             Self::Doctor(args) => doctor::run(&args),
-        }
-    }
-
-    /// Arguments about the script, for commands that load one.
-    pub(crate) fn script_mut(&mut self) -> Option<&mut ScriptArgs> {
-        match self {
-            Self::Run(args) => Some(&mut args.script),
-            Self::Check(args) => Some(&mut args.script),
-            Self::View(args) => Some(&mut args.script),
-            Self::Watch(args) => Some(&mut args.script),
-            Self::Record(args) => Some(&mut args.script),
-            Self::Serve(args) => Some(&mut args.script),
-            Self::Dataset(dataset::DatasetCommand::Import(args)) => Some(&mut args.script),
-            _ => None,
         }
     }
 }

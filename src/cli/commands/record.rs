@@ -38,8 +38,7 @@ pub(crate) struct RecordArgs {
 pub(super) fn run(args: RecordArgs) -> Result<(), CliError> {
     let mut policy = args.policy;
     let recording = &args.recording.options(policy.take_export_code());
-    let request = args.recording.request(args.script, args.tasks)?;
-    let loaded = request.load_plan("record", &policy)?;
+    let loaded = args.recording.config(args.script, args.tasks)?.load()?.with_policy(&policy.options())?;
     let count = DemoCount { demos: args.demos, attempts: args.attempts };
     let recorded = record(&loaded, |teacher| policy.taught_by(teacher), count, recording)?;
     print_recording(&recording.out, recorded)

@@ -5,10 +5,9 @@ use std::path::{Path, PathBuf};
 use clap::Parser;
 
 use crate::{
-    args::{PolicyArgs, Request, RunFlags, ScriptArgs},
+    args::{PolicyArgs, RunFlags, ScriptArgs},
     error::{CliError, Exit},
     output::{eprint_notice, print, print_json, print_table, terminal_format},
-    plan_flags,
 };
 use softvt_benchmark::Plan;
 use softvt_policy::profile::Profile;
@@ -22,6 +21,7 @@ use softvt_report::{
 use softvt_runner::{
     ConfiguredScript, Runner, SuiteResult, conditions,
     experiment::{self, ExperimentOutput},
+    plan_noun,
     selection::{check_distinct_out_dirs, check_parent_folder, next_run_dir},
 };
 use softvt_runs::{requirement::Requirement, summary::SuiteSummary};
@@ -56,9 +56,11 @@ pub(super) fn run(args: RunArgs) -> Result<(), CliError> {
     let (json, requirements) = (args.flags.json, args.flags.requirements.clone());
     let details = args.flags.details;
     let format = terminal_format(details);
-    let request = Request::new(args.script)?.with(|config| args.flags.apply(config));
-    let run = request.load_plan(plan_flags::RUN, &args.policy)?;
+    let run = args.flags.apply(args.script.config()?).load()?.with_policy(&args.policy.options())?;
     let ConfiguredScript { config, script: loaded } = &run;
+    if !(requirements.is_empty() || matches!(loaded.plan, Plan::Suite(_) | Plan::Suites { .. })) {
+        return Err(config.no_effect("requirements", plan_noun(&loaded.plan)).into());
+    }
     if let Some(code) = config.policy.gripper {
         let profile = config.policy.profile().map(|Profile { name, .. }| format!(" (profile {name})"));
         eprint_notice(format!("gripper: {}{}", code.name(), profile.unwrap_or_default()));

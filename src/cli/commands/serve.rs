@@ -12,7 +12,7 @@ use clap::{Args, value_parser};
 
 use crate::{
     QUIET_INTERRUPT,
-    args::{ProfileArgs, Request, ScriptArgs, parse_count, parse_folder},
+    args::{ProfileArgs, ScriptArgs, parse_count, parse_folder},
     error::{CliError, Exit},
     output::{eprint_notice, print, print_table, terminal_format},
 };
@@ -108,18 +108,16 @@ fn watch_stdin() -> Result<(), CliError> {
 }
 
 fn serve(args: ServeArgs) -> Result<(), CliError> {
-    let request = Request::new(args.script.clone())?;
-    let policy = PolicyConfig::client(&args.profile.options(), args.privileged)?;
-    let request = request.with(|config| RunConfig {
-        policy,
+    let run = RunConfig {
+        policy: PolicyConfig::client(&args.profile.options(), args.privileged)?,
         tasks: args.tasks.clone(),
         episodes: args.episodes,
         out: args.out.clone(),
         resume: args.resume,
         shard: args.shard,
-        ..config
-    });
-    let run = request.load("serve")?;
+        ..args.script.clone().config()?
+    }
+    .load()?;
     let config = &run.config;
     check_served(&run)?;
     // After the checks, so that an error of the script is reported even if standard input is closed already.

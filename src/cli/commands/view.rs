@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 
 use crate::{
-    args::{ComparedPolicyArgs, Request, ScriptArgs, parse_folder, select_one_task},
+    args::{ComparedPolicyArgs, ScriptArgs, parse_folder, select_one_task},
     error::CliError,
     output::{Progress, print},
 };
@@ -68,9 +68,8 @@ pub(crate) struct ViewArgs {
 /// # Errors
 /// The script is not a suite, the task or episode fails, or a file cannot be rendered or written.
 pub(super) fn run(args: ViewArgs) -> Result<(), CliError> {
-    let tasks = vec![args.task.clone()];
-    let request = Request::new(args.script.clone())?.with(|config| RunConfig { tasks, ..config });
-    let ConfiguredScript { config, script: loaded } = request.load("view")?;
+    let config = RunConfig { tasks: vec![args.task.clone()], ..args.script.clone().config()? };
+    let ConfiguredScript { config, script: loaded } = config.load()?;
     let policies = args.policies.load()?;
     let Plan::Suite(suite) = &loaded.plan else {
         let message = "expected a single suite; name a file that returns softvt.suite";

@@ -9,8 +9,8 @@ use clap::Args;
 
 use crate::{
     QUIET_INTERRUPT,
-    args::{PolicyArgs, Request, ScriptArgs, load_one_run, parse_count, parse_folder, select_one_task},
-    error::{CliError, flag_of},
+    args::{PolicyArgs, ScriptArgs, load_one_run, parse_count, parse_folder, select_one_task},
+    error::CliError,
     output::{Console, print},
 };
 use softvt_common::{episode_id::EpisodeSplit, text::hex};
@@ -74,8 +74,8 @@ pub(super) fn run(args: WatchArgs) -> Result<(), CliError> {
 
 /// The program of a script.
 fn script_program(args: &WatchArgs) -> Result<Program, CliError> {
-    let request = Request::new(args.script.clone())?;
-    let ConfiguredScript { config, script } = request.load_plan("watch", &args.policy)?;
+    let run = args.script.clone().config()?.load()?.with_policy(&args.policy.options())?;
+    let ConfiguredScript { config, script } = run;
     let [suite, ..] = suites_of(&script.plan) else {
         let message = "it has no suite to watch; name a file that returns softvt.suite or a list of suites";
         return Err(config.error(message).into());
@@ -92,13 +92,10 @@ fn script_program(args: &WatchArgs) -> Result<Program, CliError> {
 /// The program of a stored run, whose actions are repeated.
 fn recorded_program(args: &WatchArgs) -> Result<Program, CliError> {
     let dir = &args.script.file;
-    // Groups of flags are listed by the names of their types.
-    let is_flag = |id: &&String| id.chars().all(|c| c.is_lowercase() || c == '_');
-    let has_effect = |id: &&String| ["file", "port", "task", "episode"].contains(&id.as_str());
-    if let Some(id) = args.script.given.iter().filter(is_flag).find(|id| !has_effect(id)) {
-        let message = format!("{} has no effect on the run {}; leave it out", flag_of(id), dir.display());
-        return Err(CliError::input(message));
-    }
+    let user = format!("the run {}", dir.display());
+    let given = RunConfig { out: args.out.clone(), episodes: args.episodes, ..args.script.clone().config()? };
+    given.check_read(&RunConfig::of(dir), &user)?;
+    given.check_no_policy(&args.policy.options(), &user)?;
     let stored = load_one_run(dir)?;
     let observer: Arc<dyn Observer> = Arc::new(Console::default());
     let stored = StoredRun { dir: enter_for_run(&stored, &*observer)?, ..stored };

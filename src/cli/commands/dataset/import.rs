@@ -39,7 +39,7 @@ pub(crate) struct ImportArgs {
 /// As [`import::import`].
 pub(super) fn run(args: ImportArgs) -> Result<(), CliError> {
     let recording = &args.recording.options(None);
-    let run = args.recording.request(args.script, args.tasks)?.load("dataset import")?;
+    let run = args.recording.config(args.script, args.tasks)?.load()?;
     let options =
         ImportOptions { attempts: args.attempts, ignore_recorded_poses: args.ignore_recorded_poses };
     print_recording(&recording.out, import::import(&run, &args.files, options, recording)?)

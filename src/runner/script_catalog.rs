@@ -42,8 +42,7 @@ pub fn assets() -> Vec<Value> {
 
 /// Policies: built-in ones, and Lua files.
 pub fn policies() -> Vec<Value> {
-    let built_in =
-        BuiltinPolicy::ALL.into_iter().map(|policy| (policy.name().to_owned(), policy.about().to_owned()));
+    let built_in = BuiltinPolicy::all().map(|policy| (policy.name().to_owned(), policy.about()));
     named(built_in, "scripts/policies")
 }
 

@@ -8,7 +8,7 @@ use std::time::Instant;
 use cpu_time::ThreadTime;
 use serde::{Deserialize, Serialize};
 
-use super::{config::RunConfig, error::RunError};
+use crate::{config::RunConfig, error::RunError};
 use softvt_benchmark::{CONTROL_HZ, Plan, Suite};
 use softvt_common::{
     cancel,

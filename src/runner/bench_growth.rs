@@ -6,9 +6,9 @@ use std::sync::Arc;
 use cpu_time::ThreadTime;
 
 use super::{
+    bench_rates::{Caches, all_streams, fastest, first_episode, observations_per_s, suite_of, time_episode},
     config::RunConfig,
     error::RunError,
-    rates::{Caches, all_streams, fastest, first_episode, observations_per_s, suite_of, time_episode},
 };
 use softvt_common::{cancel, text::TextTable};
 use softvt_geometry::{Pose, Vec3, shape::Shape};
