@@ -125,16 +125,13 @@ impl ScriptArgs {
     /// A shift or setting that is not `NAME=VALUE`, or a seed file that cannot be read.
     pub(crate) fn config(self) -> Result<RunConfig, CliError> {
         let secret = self.secret.as_deref().map(read_secret).transpose()?;
-        let changes = || -> Result<(Vec<ShiftValue>, Vec<(String, String)>), CliError> {
-            let shifts: Vec<ShiftValue> =
-                self.shifts.iter().map(|word| parse_shift(word)).collect::<Result<_, _>>()?;
-            let settings = self.settings.iter().map(|word| parse_pair("--set", word));
-            let settings: Vec<(String, String)> = settings.collect::<Result<_, _>>()?;
-            refuse_repeated("--shift", shifts.iter().map(|shift| shift.name.as_str()))?;
-            refuse_repeated("--set", settings.iter().map(|(path, _)| path.as_str()))?;
-            Ok((shifts, settings))
-        };
-        let (shifts, settings) = changes().map_err(|error| error.prefixed(self.file.display()))?;
+        let in_file = |error: CliError| error.prefixed(self.file.display());
+        let shifts = self.shifts.iter().map(|word| parse_shift(word));
+        let shifts: Vec<ShiftValue> = shifts.collect::<Result<_, _>>().map_err(in_file)?;
+        let settings = self.settings.iter().map(|word| parse_pair("--set", word));
+        let settings: Vec<(String, String)> = settings.collect::<Result<_, _>>().map_err(in_file)?;
+        refuse_repeated("--shift", shifts.iter().map(|shift| shift.name.as_str())).map_err(in_file)?;
+        refuse_repeated("--set", settings.iter().map(|(path, _)| path.as_str())).map_err(in_file)?;
         Ok(RunConfig {
             shifts,
             settings,

@@ -32,7 +32,7 @@ impl Menu {
 pub(crate) fn policies(given: &str) -> Vec<String> {
     let others = BuiltinPolicy::all().map(BuiltinPolicy::name).chain([TELEOP]);
     let others = others.filter(|name| *name != given);
-    iter::once(given).chain(others).map(str::to_owned).collect()
+    iter::once(given.to_owned()).chain(others.map(str::to_owned)).collect()
 }
 
 /// # Errors

@@ -429,7 +429,7 @@ fn the_table_shows_every_fault_in_its_numbers() {
 
     let (demo, held) = demonstration(&project.path("data"));
     assert!(!held.agrees() && held.answers > 100 && held.text().contains("deviates"), "{}", held.text());
-    let (demo, tilted) = (Arc::new(demo), Arc::new(tilted(&demo)));
+    let (tilted, demo) = (Arc::new(tilted(&demo)), Arc::new(demo));
     let failed = check(&demo, &encoding("visuo_tactile"), |_| vec![f64::NAN; 7]);
     assert!(!failed.agrees() && failed.text().contains("demonstration 1, step 0: "), "{}", failed.text());
     let pose = encoding("visuo_tactile");
