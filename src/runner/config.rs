@@ -445,6 +445,36 @@ mod tests {
     use super::*;
 
     #[test]
+    fn a_field_that_an_experiment_does_not_read_is_refused() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let file = folder.path().join("x.lua");
+        let text =
+            "return softvt.experiment { name = 'e', grid = { x = { 1 } }, run = function() return {} end }";
+        std::fs::write(&file, text).expect("written");
+        let load = |change: fn(RunConfig) -> RunConfig| change(RunConfig::of(&file)).load();
+        let run = load(|config| RunConfig { threads: Some(2), seed: 3, out: Some("x".into()), ..config });
+        let options = PolicyOptions { replan: Some(2), ..PolicyOptions::default() };
+        let refused =
+            run.unwrap_or_else(|error| panic!("{error}")).with_policy(&options).err().expect("refused");
+        assert!(refused.to_string().ends_with(": replan: has no effect on an experiment; leave it out"));
+        let unread: [(&str, fn(RunConfig) -> RunConfig); 6] = [
+            ("secret", |config| RunConfig { secret: Some(SecretSeed::new(b"0123456789abcdef")), ..config }),
+            ("rigid_twin", |config| RunConfig { rigid_twin: true, ..config }),
+            ("vary", |config| RunConfig { vary: Some("x.lua".into()), ..config }),
+            ("episodes", |config| RunConfig { episodes: Some(1), ..config }),
+            ("trace", |config| RunConfig { trace: Some(TraceDetail::State), ..config }),
+            ("shard", |config| RunConfig { shard: Shard::new(1, 2), ..config }),
+        ];
+        for (field, change) in unread {
+            let message = load(change).err().expect(field).to_string();
+            assert!(
+                message.ends_with(&format!(": {field}: has no effect on an experiment; leave it out")),
+                "{message}"
+            );
+        }
+    }
+
+    #[test]
     fn shards_partition_the_episodes() {
         let shards: Vec<Shard> = (1..=3).map(|i| format!("{i}/3").parse().unwrap()).collect();
         for job in 0..20 {

@@ -57,7 +57,7 @@ pub use policy::{
 pub use record::{DemoCount, record};
 pub use runner::Runner;
 pub use served_runs::ServedRuns;
-pub use serving::{check_served, first_observation, prepare_served, server_config};
+pub use serving::SuiteServer;
 pub use stored_scripts::StoredScripts;
 pub use suite_run::{PreparedRun, SuiteRun};
 pub use thumbnails::thumbnails;

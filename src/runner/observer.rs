@@ -7,35 +7,23 @@ use softvt_evaluation::category::EpisodeCategory;
 /// Receives the progress and the messages of runs. Its methods are called from any thread; by default they do nothing.
 pub trait Observer: Send + Sync {
     /// A message that needs no answer, such as a warning.
-    fn notice(&self, message: &str) {
-        let _ = message;
-    }
+    fn notice(&self, _message: &str) {}
 
     /// Work begins that can take seconds and has no results of its own, such as `checking the scenes`. It ends with the
     /// next call of `begin`, `end` or this function.
-    fn work(&self, what: &str) {
-        let _ = what;
-    }
+    fn work(&self, _what: &str) {}
 
     /// A list of jobs begins; `what` names it.
-    fn begin(&self, what: &str) {
-        let _ = what;
-    }
+    fn begin(&self, _what: &str) {}
 
     /// The list has `count` more jobs.
-    fn expect(&self, count: usize) {
-        let _ = count;
-    }
+    fn expect(&self, _count: usize) {}
 
     /// A job of the list has ended, with one line about its result.
-    fn advance(&self, line: &str) {
-        let _ = line;
-    }
+    fn advance(&self, _line: &str) {}
 
     /// An episode of the list has been judged; [`Self::advance`] follows.
-    fn judged(&self, category: EpisodeCategory) {
-        let _ = category;
-    }
+    fn judged(&self, _category: EpisodeCategory) {}
 
     /// The list, or the work, has ended.
     fn end(&self) {}

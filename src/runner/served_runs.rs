@@ -1,6 +1,10 @@
 //! Runs of a server: one folder per suite, with the episodes that clients step to their end.
 
-use std::{collections::BTreeSet, path::Path, sync::Mutex};
+use std::{
+    collections::BTreeSet,
+    path::Path,
+    sync::{Arc, Mutex},
+};
 
 use crate::{
     config::RunConfig,
@@ -23,7 +27,7 @@ pub struct ServedRuns<'a> {
     runs: Vec<ServedRun<'a>>,
     /// The first error of writing a file. The server ends then.
     failure: Mutex<Option<RunError>>,
-    cancel: CancelFlag,
+    cancel: Arc<CancelFlag>,
 }
 
 /// The run folder of one suite.
@@ -35,13 +39,17 @@ struct ServedRun<'a> {
 }
 
 impl<'a> ServedRuns<'a> {
-    /// Creates the folders of prepared runs, or opens them where [`RunConfig::resume`] is set.
+    /// Creates the folders of prepared runs, or opens them where [`RunConfig::resume`] is set. A file that cannot be
+    /// written requests the end of the server by `cancel`.
     ///
     /// # Errors
     /// A folder holds another run or anything else, or cannot be written. No empty folder is left then.
-    pub fn open(config: &'a RunConfig, runs: &'a [PreparedRun<'a>]) -> Result<Self, RunError> {
-        let mut opened =
-            Self { config, runs: Vec::new(), failure: Mutex::default(), cancel: CancelFlag::default() };
+    pub fn open(
+        config: &'a RunConfig,
+        runs: &'a [PreparedRun<'a>],
+        cancel: Arc<CancelFlag>,
+    ) -> Result<Self, RunError> {
+        let mut opened = Self { config, runs: Vec::new(), failure: Mutex::default(), cancel };
         for run in runs {
             match ServedRun::open(run) {
                 Ok(run) => opened.runs.push(run),
@@ -52,11 +60,6 @@ impl<'a> ServedRuns<'a> {
             }
         }
         Ok(opened)
-    }
-
-    /// Ends the server: set by a file that cannot be written.
-    pub fn cancel(&self) -> &CancelFlag {
-        &self.cancel
     }
 
     /// Interface of the server to the recorded runs.

@@ -1,33 +1,79 @@
 //! The suites of a script as a server offers them to clients.
 
+use std::{net::TcpListener, sync::Arc};
+
 use serde_json::json;
 
 use crate::{
     config::{ConfiguredScript, RunConfig},
     error::RunError,
     selection::{check_distinct_out_dirs, check_parent_folder, no_suites, run_dir, suites_of},
+    served_runs::ServedRuns,
     suite_run::{PreparedRun, SuiteRun},
 };
 use softvt_benchmark::{Plan, Suite};
-use softvt_common::episode_id::{EpisodeId, EpisodeSplit};
+use softvt_common::{
+    cancel::CancelFlag,
+    episode_id::{EpisodeId, EpisodeSplit},
+};
 use softvt_policy::Observation;
+use softvt_runs::summary::SuiteSummary;
 use softvt_script::LoadedScript;
 use softvt_serve::{AccessRules, RequestError, ServerConfig};
 
-/// Checks that a script has a task to serve.
-///
-/// # Errors
-/// It has none.
-pub fn check_served(ConfiguredScript { config, script: loaded }: &ConfiguredScript) -> Result<(), RunError> {
-    let is_empty = suites_of(&loaded.plan).iter().all(|suite| suite.tasks.is_empty());
-    if is_empty { Err(no_suites(config)) } else { Ok(()) }
+/// A server that clients can reach.
+pub struct SuiteServer {
+    /// Where clients connect.
+    pub listener: TcpListener,
+    /// Who may connect.
+    pub access: AccessRules,
+    /// List of episodes for clients that do not name one.
+    pub split: EpisodeSplit,
+    /// Largest number of clients at a time.
+    pub max_clients: usize,
+    /// Ends the server.
+    pub cancel: Arc<CancelFlag>,
+}
+
+impl SuiteServer {
+    /// Serves the suites of a script until its end is requested. With an output folder, episodes are recorded. Calls
+    /// `on_ready` once the first observation is rendered. Returns the results of the recorded runs, and why the server
+    /// ended: a file that could not be written, or an interrupt.
+    ///
+    /// # Errors
+    /// A script without a task, a suite, scene or sensor that is not valid, or a folder that holds something else.
+    pub fn serve<E: From<RunError>>(
+        self,
+        run: &ConfiguredScript,
+        on_ready: impl FnOnce() -> Result<(), E>,
+    ) -> Result<(Vec<SuiteSummary>, Result<(), RunError>), E> {
+        let ConfiguredScript { config, script: loaded } = run;
+        if suites_of(&loaded.plan).iter().all(|suite| suite.tasks.is_empty()) {
+            return Err(no_suites(config).into());
+        }
+        let runs = prepare_served(run, self.split)?;
+        // Declared here, since the configuration of the server borrows it.
+        let served;
+        let mut server = server_config(run, &runs, self.access)?;
+        config.observer.work("rendering the first observation");
+        let first = first_observation(config, &server)?;
+        config.observer.end();
+        let open = || ServedRuns::open(config, &runs, self.cancel.clone());
+        served = config.out.as_ref().map(|_| open()).transpose()?;
+        server.recorder = served.as_ref().map(ServedRuns::recorder);
+        let hello = softvt_serve::hello(&server, &first);
+        on_ready()?;
+        softvt_serve::serve(&self.listener, &server, hello, self.max_clients, &self.cancel);
+        drop(server);
+        Ok(served.map_or_else(|| (Vec::new(), Err(RunError::interrupted(""))), ServedRuns::finish))
+    }
 }
 
 /// The suites with all that their episodes need. Their scenes are checked, completely so if episodes are recorded.
 ///
 /// # Errors
 /// A suite, shift, setting, scene or calibration file that is not valid.
-pub fn prepare_served<'a>(
+fn prepare_served<'a>(
     ConfiguredScript { config, script: loaded }: &'a ConfiguredScript,
     split: EpisodeSplit,
 ) -> Result<Vec<PreparedRun<'a>>, RunError> {
@@ -55,7 +101,7 @@ pub fn prepare_served<'a>(
 ///
 /// # Errors
 /// A policy without a profile.
-pub fn server_config<'a>(
+fn server_config<'a>(
     ConfiguredScript { config, script: loaded }: &'a ConfiguredScript,
     runs: &'a [PreparedRun<'a>],
     access: AccessRules,
@@ -88,7 +134,7 @@ pub fn server_config<'a>(
 ///
 /// # Errors
 /// The scene or a sensor is not valid.
-pub fn first_observation(config: &RunConfig, server: &ServerConfig) -> Result<Observation, RunError> {
+fn first_observation(config: &RunConfig, server: &ServerConfig) -> Result<Observation, RunError> {
     let first = server.suites.iter().find_map(|suite| Some((suite, suite.tasks.first()?)));
     let (suite, task) = first.ok_or_else(|| RunError::input("there is no task to serve"))?;
     let id = EpisodeId {

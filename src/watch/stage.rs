@@ -214,7 +214,7 @@ impl Stage {
         job: EpisodeJob,
     ) -> Result<(), RunError> {
         let id = run.episode_id(job.task, job.episode);
-        let served = ServedRuns::open(config, std::slice::from_ref(run))?;
+        let served = ServedRuns::open(config, std::slice::from_ref(run), Arc::default())?;
         let recorder = served.recorder();
         let (out, index) = (run.out.display(), id.index());
         let driven = if (recorder.selects)(&id) {

@@ -15,10 +15,7 @@ use rmpv::Value;
 use softvt::{
     cancel::CancelFlag,
     episode_id::EpisodeSplit,
-    runner::{
-        PolicyConfig, PolicyOptions, RunConfig, RunError, ServedRuns, check_served, first_observation,
-        prepare_served, server_config,
-    },
+    runner::{PolicyConfig, PolicyOptions, RunConfig, RunError, SuiteServer},
     runs::summary::SuiteSummary,
     serve::{self, AccessRules},
 };
@@ -73,35 +70,28 @@ impl Server {
     ) -> Result<Vec<SuiteSummary>, RunError> {
         let policy = PolicyConfig::client(policy, access.is_privileged)?;
         let run = config.with_policy(policy).load()?;
-        let config = &run.config;
-        check_served(&run)?;
         let listener = serve::listen("127.0.0.1", 0).expect("a port");
         let address = listener.local_addr().expect("an address");
-        let runs = prepare_served(&run, access.split)?;
-        // Declared here, since the configuration of the server borrows it.
-        let served;
-        let rules = AccessRules::new("127.0.0.1", address, access.token);
-        let mut server = server_config(&run, &runs, rules)?;
-        let first = first_observation(config, &server)?;
-        served = config.out.as_ref().map(|_| ServedRuns::open(config, &runs)).transpose()?;
-        server.recorder = served.as_ref().map(ServedRuns::recorder);
-        let hello = serve::hello(&server, &first);
-        started.send(address.to_string()).expect("awaited");
-        let own = CancelFlag::default();
-        let cancel = served.as_ref().map_or(&own, ServedRuns::cancel);
-        thread::scope(|scope| {
-            scope.spawn(move || {
+        let cancel: Arc<CancelFlag> = Arc::default();
+        let server = SuiteServer {
+            listener,
+            access: AccessRules::new("127.0.0.1", address, access.token),
+            split: access.split,
+            max_clients: access.max_clients,
+            cancel: cancel.clone(),
+        };
+        let has_folder = run.config.out.is_some();
+        let (summaries, outcome) = server.serve(&run, || -> Result<(), RunError> {
+            started.send(address.to_string()).expect("awaited");
+            thread::spawn(move || {
                 let goes_on =
                     || stop.recv_timeout(Duration::from_millis(10)) == Err(RecvTimeoutError::Timeout);
                 while !cancel.requested() && goes_on() {}
                 cancel.request();
             });
-            serve::serve(&listener, &server, hello, access.max_clients, cancel);
-        });
-        drop(server);
-        let Some(served) = served else { return Ok(Vec::new()) };
-        let (summaries, outcome) = served.finish();
-        outcome.map(|()| summaries)
+            Ok(())
+        })?;
+        if has_folder { outcome.map(|()| summaries) } else { Ok(Vec::new()) }
     }
 
     /// A server of a run, or the message of its error.

@@ -4,7 +4,10 @@ use std::{
     io::{self, ErrorKind},
     net::TcpListener,
     path::PathBuf,
-    sync::atomic::{AtomicBool, Ordering},
+    sync::{
+        Arc,
+        atomic::{AtomicBool, Ordering},
+    },
     thread,
 };
 
@@ -16,15 +19,9 @@ use crate::{
     error::{CliError, Exit},
     output::{eprint_notice, print, print_table, terminal_format},
 };
-use softvt_common::{
-    cancel::{self, CancelFlag},
-    episode_id::EpisodeSplit,
-};
+use softvt_common::{cancel, episode_id::EpisodeSplit};
 use softvt_report::terminal;
-use softvt_runner::{
-    PolicyConfig, RunConfig, ServedRuns, Shard, check_served, first_observation, prepare_served,
-    server_config,
-};
+use softvt_runner::{PolicyConfig, RunConfig, Shard, SuiteServer};
 use softvt_serve::AccessRules;
 
 /// Environment variable with the token of the server. A flag shows it to other users of the machine.
@@ -118,41 +115,26 @@ fn serve(args: ServeArgs) -> Result<(), CliError> {
         ..args.script.clone().config()?
     }
     .load()?;
-    let config = &run.config;
-    check_served(&run)?;
-    // After the checks, so that an error of the script is reported even if standard input is closed already.
     if args.until_stdin_closes {
         watch_stdin()?;
     }
     let listener = listen(&args)?;
-    let runs = prepare_served(&run, args.split)?;
     let address = listener.local_addr().map_err(|error| CliError::input(error).prefixed(&args.host))?;
-    // Declared here, since the configuration of the server borrows it.
-    let served;
-    let access = AccessRules::new(&args.host, address, token(&args)?);
-    let mut server_config = server_config(&run, &runs, access)?;
-    config.observer.work("rendering the first observation");
-    let first = first_observation(config, &server_config)?;
-    config.observer.end();
-    served = config.out.as_ref().map(|_| ServedRuns::open(config, &runs)).transpose()?;
-    server_config.recorder = served.as_ref().map(ServedRuns::recorder);
-    let hello = softvt_serve::hello(&server_config, &first);
-    print(&format!("ws://{address}\n"))?;
-    // Without results to keep, the end of a server is no event.
-    QUIET_INTERRUPT.store(served.is_none(), Ordering::Relaxed);
-    let own = CancelFlag::default();
-    let cancel = served.as_ref().map_or(&own, ServedRuns::cancel);
-    softvt_serve::serve(&listener, &server_config, hello, usize::from(args.threads), cancel);
-    drop(server_config);
-    match served {
-        Some(served) => {
-            let (summaries, outcome) = served.finish();
-            let format = terminal_format(false);
-            summaries.iter().try_for_each(|summary| print_table(&terminal::table(summary, format)))?;
-            Ok(outcome?)
-        }
-        None => Err(CliError::interrupted("")),
-    }
+    let server = SuiteServer {
+        listener,
+        access: AccessRules::new(&args.host, address, token(&args)?),
+        split: args.split,
+        max_clients: usize::from(args.threads),
+        cancel: Arc::default(),
+    };
+    let (summaries, outcome) = server.serve(&run, || -> Result<(), CliError> {
+        // Without results to keep, the end of a server is no event.
+        QUIET_INTERRUPT.store(run.config.out.is_none(), Ordering::Relaxed);
+        print(&format!("ws://{address}\n"))
+    })?;
+    let format = terminal_format(false);
+    summaries.iter().try_for_each(|summary| print_table(&terminal::table(summary, format)))?;
+    Ok(outcome?)
 }
 
 /// The token that clients have to send.

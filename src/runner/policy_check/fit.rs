@@ -14,6 +14,8 @@ use softvt_robot::panda::ARM_DOFS;
 const AGREEING_SCALES: std::ops::RangeInclusive<f64> = 0.4..=2.5;
 /// Largest share of the motion of the demonstrations that the fit may leave.
 const RESIDUAL_SHARE: f64 = 0.87;
+/// Standard deviation of a quantity below which it does not vary, in m, rad or closures.
+const LEAST_VARIATION: f64 = 1e-4;
 /// Share of the variance of an answer that another quantity must explain to be its source.
 const EXPLAINED: f64 = 0.5;
 /// Times by which the residual of another source, or of another timing, must be smaller.
@@ -30,37 +32,17 @@ const MAX_LAG: i32 = 10;
 /// Lag within which policies differ, control steps.
 const AGREEING_LAG: i32 = 1;
 
-/// Units of channels, with what says nothing and what agrees in them.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-#[serde(rename_all = "snake_case")]
-pub enum ChannelUnit {
-    /// Positions.
-    Metre,
-    /// Angles.
-    Radian,
-    /// Closures of the gripper.
-    Closure,
-}
-
-/// What says nothing in the unit of a channel.
-struct Tolerance {
-    /// Standard deviation of a demonstration below which it does not tell a scale.
-    variation: f64,
-    /// Offsets that are a matter of precision.
+/// A unit of channels.
+struct Unit {
+    name: &'static str,
+    /// Offsets and residuals that are a matter of precision.
     offset: f64,
-    /// Residuals that are a matter of precision.
     residual: f64,
 }
 
-impl ChannelUnit {
-    fn tolerance(self) -> Tolerance {
-        match self {
-            Self::Metre => Tolerance { variation: 1e-3, offset: 0.02, residual: 0.01 },
-            Self::Radian => Tolerance { variation: 5e-3, offset: 0.08, residual: 0.1 },
-            Self::Closure => Tolerance { variation: 0.02, offset: 0.25, residual: 0.25 },
-        }
-    }
-}
+const METRE: Unit = Unit { name: "m", offset: 0.02, residual: 0.01 };
+const RADIAN: Unit = Unit { name: "rad", offset: 0.08, residual: 0.1 };
+const CLOSURE: Unit = Unit { name: "closure", offset: 0.25, residual: 0.25 };
 
 /// The affine map from the demonstrations to one channel of the answers. Offset and residual are in the unit of the
 /// channel.
@@ -70,9 +52,9 @@ pub struct ChannelFit {
     pub channel: String,
     /// Quantity of the demonstrations that it follows best.
     pub source: String,
-    /// Unit of the channel.
-    pub unit: ChannelUnit,
-    /// Scale of the answer; null if the source does not vary.
+    /// Unit of the channel: m, rad, or the closure of the gripper.
+    pub unit: &'static str,
+    /// Scale of the answer; null if the demonstrations do not tell it.
     pub scale: Option<f64>,
     /// Offset of the answer.
     pub offset: f64,
@@ -92,7 +74,7 @@ pub struct ChannelFit {
 struct Channel {
     index: usize,
     name: String,
-    unit: ChannelUnit,
+    unit: Unit,
     own: Vec<Quantity>,
 }
 
@@ -141,9 +123,9 @@ impl Comparison<'_> {
     fn channels(&self) -> Vec<Channel> {
         let motion = |index: usize| {
             let (own, unit) = match (self.has_joints, index) {
-                (true, i) => (Quantity::Joint(i), ChannelUnit::Radian),
-                (false, 0..3) => (Quantity::Position(index), ChannelUnit::Metre),
-                (false, _) => (Quantity::AxisAngle(index - 3), ChannelUnit::Radian),
+                (true, i) => (Quantity::Joint(i), RADIAN),
+                (false, 0..3) => (Quantity::Position(index), METRE),
+                (false, _) => (Quantity::AxisAngle(index - 3), RADIAN),
             };
             let shown = if self.is_step { self.displacement(index) } else { own };
             Channel { index, name: shown.name(), unit, own: vec![shown] }
@@ -153,8 +135,7 @@ impl Comparison<'_> {
             GripCode::Binary => vec![Quantity::Closed],
             _ => vec![Quantity::Closure, Quantity::Closed],
         };
-        let grip =
-            Channel { index: count, name: "gripper".to_owned(), unit: ChannelUnit::Closure, own: grip };
+        let grip = Channel { index: count, name: "gripper".to_owned(), unit: CLOSURE, own: grip };
         (0..count).map(motion).chain([grip]).collect()
     }
 
@@ -177,13 +158,13 @@ impl Comparison<'_> {
         };
         let axes = |of: fn(usize) -> Quantity, form: Form| (0..3).map(move |i| (of(i), form));
         let mut all = Vec::new();
-        if channel.unit == ChannelUnit::Closure {
+        if channel.unit.name == CLOSURE.name {
             all.extend(channel.own.iter().map(|own| reading(*own, Form::Plain)));
         } else {
             let own = Reading { is_own: true, ..reading(self.displacement(channel.index), Form::Displaced) };
             all.push(own);
         }
-        let mut others: Vec<(Quantity, Form)> = vec![(Quantity::Nothing, Form::Plain)];
+        let mut others: Vec<(Quantity, Form)> = Vec::new();
         if self.has_joints {
             others.extend((0..ARM_DOFS).map(|i| (Quantity::Joint(i), Form::Plain)));
             others.extend((0..ARM_DOFS).map(|i| (Quantity::JointShift(i), Form::Plain)));
@@ -262,50 +243,53 @@ impl Comparison<'_> {
         }
         let (n, mean_x, mean_y) = (x.len() as f64, mean(&x)?, mean(&y)?);
         let (spread_x, spread_y) = (spread(&x), spread(&y));
-        if spread_x < channel.unit.tolerance().variation {
-            let (scale, offset, residual) = match (is_own, quantity) {
-                (true, _) => {
-                    let left: Vec<f64> = x.iter().zip(&y).map(|(x, y)| y - x).collect();
-                    (None, mean_y - mean_x, spread(&left))
-                }
-                (_, Quantity::Nothing) => (Some(0.0), mean_y, spread_y),
-                _ => return None,
-            };
-            return Some(Fit { reading, scale, scale_error: 0.0, offset, residual });
-        }
         let both = x.iter().zip(&y).map(|(x, y)| (x - mean_x) * (y - mean_y)).sum::<f64>() / n;
         let scale = both / spread_x.powi(2);
         let residual = (spread_y.powi(2) - scale * both).max(0.0).sqrt();
-        let is_explained = residual.powi(2) <= (1.0 - EXPLAINED) * spread_y.powi(2);
         let scale_error = residual / (n.sqrt() * spread_x);
-        let offset = mean_y - scale * mean_x;
-        (is_own || is_explained).then_some(Fit { reading, scale: Some(scale), scale_error, offset, residual })
+        if spread_x > LEAST_VARIATION && scale_error <= 0.5 * scale.abs().max(1.0) {
+            let is_explained = residual < (1.0 - EXPLAINED).sqrt() * spread_y;
+            let offset = mean_y - scale * mean_x;
+            return (is_explained || is_own && timing == Timing::NONE).then_some(Fit {
+                reading,
+                scale: Some(scale),
+                scale_error,
+                offset,
+                residual,
+            });
+        }
+        let left: Vec<f64> = x.iter().zip(&y).map(|(x, y)| y - x).collect();
+        let (offset, residual) = (mean_y - mean_x, spread(&left));
+        (is_own && timing == Timing::NONE).then_some(Fit {
+            reading,
+            scale: None,
+            scale_error: 0.0,
+            offset,
+            residual,
+        })
     }
 
     /// Root mean square of the motion of the demonstrations in the channels of a unit.
     fn motion(&self, channel: &Channel) -> f64 {
-        let rms =
-            |values: &[f64]| mean(&values.iter().map(|x| x * x).collect::<Vec<_>>()).unwrap_or(0.0).sqrt();
-        let quantities: Vec<Quantity> = match (channel.unit, self.has_joints) {
-            (ChannelUnit::Closure, _) => return spread(&self.recorded(Quantity::Closure)),
-            (_, true) => vec![Quantity::JointShift(channel.index)],
-            (ChannelUnit::Metre, _) => (0..3).map(Quantity::Shift).collect(),
-            (ChannelUnit::Radian, _) => (0..3).map(Quantity::Turn).collect(),
+        let of = |quantity: Quantity| -> Vec<f64> {
+            let of_demo = |demo: &DemoSeries| -> Vec<f64> {
+                (0..demo.steps.len()).filter_map(|now| demo.quantity(quantity, now, Timing::NONE)).collect()
+            };
+            self.demos.iter().flat_map(of_demo).collect()
         };
-        rms(&quantities.into_iter().flat_map(|quantity| self.recorded(quantity)).collect::<Vec<_>>())
-    }
-
-    fn recorded(&self, quantity: Quantity) -> Vec<f64> {
-        let of_demo = |demo: &DemoSeries| -> Vec<f64> {
-            (0..demo.steps.len()).filter_map(|now| demo.quantity(quantity, now, Timing::NONE)).collect()
+        let moved: Vec<f64> = match (channel.index, self.has_joints) {
+            _ if channel.unit.name == CLOSURE.name => return spread(&of(Quantity::Closure)),
+            (i, true) => of(Quantity::JointShift(i)),
+            (0..3, false) => (0..3).map(Quantity::Shift).flat_map(of).collect(),
+            (_, false) => (0..3).map(Quantity::Turn).flat_map(of).collect(),
         };
-        self.demos.iter().flat_map(of_demo).collect()
+        mean(&moved.iter().map(|x| x * x).collect::<Vec<_>>()).unwrap_or(0.0).sqrt()
     }
 
     fn describe(&self, channel: &Channel, fit: &Fit) -> ChannelFit {
         let Fit { reading: Reading { quantity, form, timing, is_own }, scale, scale_error, offset, residual } =
             *fit;
-        let tolerance = channel.unit.tolerance();
+        let unit = &channel.unit;
         let enlarged = scale.map_or(1.0, |scale| scale.abs().max(1.0));
         let (residual, motion) = (residual / enlarged, self.motion(channel));
         let agrees = |scale: f64| {
@@ -315,10 +299,10 @@ impl Comparison<'_> {
         let checks = [
             ("source", is_own),
             ("scale", scale.is_none_or(agrees)),
-            ("offset", offset.abs() <= tolerance.offset * enlarged),
+            ("offset", offset.abs() <= unit.offset * enlarged),
             ("rate", timing.rate == 1.0),
             ("lag", timing.lag.abs() <= AGREEING_LAG),
-            ("residual", residual <= tolerance.residual.max(RESIDUAL_SHARE * motion)),
+            ("residual", residual <= unit.residual.max(RESIDUAL_SHARE * motion)),
         ];
         let source = match (is_own, form) {
             (true, Form::Displaced) => channel.name.clone(),
@@ -328,7 +312,7 @@ impl Comparison<'_> {
         ChannelFit {
             channel: channel.name.clone(),
             source,
-            unit: channel.unit,
+            unit: unit.name,
             scale,
             offset,
             rate: timing.rate,

@@ -18,7 +18,7 @@ use serde::Serialize;
 
 use self::fit::channel_fits;
 pub use self::{
-    fit::{ChannelFit, ChannelUnit},
+    fit::ChannelFit,
     sampling::{AnswerComparison, DemoSamples, RecordedStep},
 };
 use crate::{
@@ -166,9 +166,9 @@ impl PolicyCheck {
     fn rows(&self) -> Vec<Vec<String>> {
         let row = |fit: &ChannelFit| {
             let (factor, unit) = match fit.unit {
-                ChannelUnit::Metre => (1e3, " mm"),
-                ChannelUnit::Radian => (180.0 / std::f64::consts::PI, "°"),
-                ChannelUnit::Closure => (1.0, ""),
+                "m" => (1e3, " mm"),
+                "rad" => (180.0 / std::f64::consts::PI, "°"),
+                _ => (1.0, ""),
             };
             let number = |x: f64| significant(x, 3);
             // Rounding leaves no digits that say nothing.

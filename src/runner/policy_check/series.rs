@@ -11,8 +11,6 @@ use softvt_robot::rotation;
 /// otherwise; displacements start at the tool pose that the policy observed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Quantity {
-    /// A constant.
-    Nothing,
     Position(usize),
     Shift(usize),
     ToolShift(usize),
@@ -34,7 +32,6 @@ impl Quantity {
     pub(super) fn name(self) -> String {
         let axis = |i: usize| AXIS_NAMES[i];
         match self {
-            Self::Nothing => "none".to_owned(),
             Self::Position(i) => axis(i).to_owned(),
             Self::Shift(i) => format!("Δ{}", axis(i)),
             Self::ToolShift(i) => format!("Δ{} of tool", axis(i)),
@@ -140,7 +137,6 @@ impl<'a> DemoSeries<'a> {
         let turn = || rotation::error(&from.tool_orientation, &self.orientations[at]);
         let to_tool = |v: Vec3| from.tool_orientation.inverse() * v;
         Some(match quantity {
-            Quantity::Nothing => 0.0,
             Quantity::Position(i) => recorded.action.position_b[i],
             Quantity::Shift(i) => shift()[i],
             Quantity::ToolShift(i) => to_tool(shift())[i],
