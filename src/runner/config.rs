@@ -457,7 +457,8 @@ mod tests {
         let refused =
             run.unwrap_or_else(|error| panic!("{error}")).with_policy(&options).err().expect("refused");
         assert!(refused.to_string().ends_with(": replan: has no effect on an experiment; leave it out"));
-        let unread: [(&str, fn(RunConfig) -> RunConfig); 6] = [
+        type Change = fn(RunConfig) -> RunConfig;
+        let unread: [(&str, Change); 6] = [
             ("secret", |config| RunConfig { secret: Some(SecretSeed::new(b"0123456789abcdef")), ..config }),
             ("rigid_twin", |config| RunConfig { rigid_twin: true, ..config }),
             ("vary", |config| RunConfig { vary: Some("x.lua".into()), ..config }),
