@@ -10,7 +10,7 @@ mod tables;
 use std::{fs, path::Path};
 
 use rows::{Rate, Row};
-use serde_json::json;
+use serde_json::{Value, json};
 use softvt::{
     evaluation::statistics,
     runs::summary::{SuiteSummary, TaskScores},
@@ -75,11 +75,13 @@ fn write_run(folder: &Path, script: &str, suite: &str, policy: &str) {
     summary.scores.safety_success_rate = statistics::Rate::new(1, 2);
     let (prompt, asset, scores) = (String::new(), String::new(), summary.scores.clone());
     summary.by_task.push(TaskScores { task: 0, prompt, asset, scores });
+    let mut manifest: Value = serde_json::from_str(include_str!("data/run.json")).expect("a manifest");
+    (manifest["script"], manifest["suite"]) = (script.into(), suite.into());
     let record = |(d, time, grip): (f64, f64, f64)| {
         json!({ "d_peak": d, "tau": 0.2, "goal_time_s": time, "grip_ratio": grip }).to_string() + "\n"
     };
     let files = [
-        ("run.json", json!({ "softvt": "1", "seed": 3, "script": script, "suite": suite }).to_string()),
+        ("run.json", manifest.to_string()),
         ("summary.json", serde_json::to_string(&summary).expect("JSON")),
         ("episodes.jsonl", [(0.1, 4.0, 1.5), (0.4, 6.0, 2.5)].map(record).concat()),
     ];

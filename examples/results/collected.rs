@@ -6,7 +6,7 @@ use std::{
 };
 
 use serde_json::Value;
-use softvt::runs::{record::EpisodeRecord, summary::SuiteSummary};
+use softvt::runs::{manifest::RunManifest, record::EpisodeRecord, summary::SuiteSummary};
 
 use crate::rows::{ROWS, Rate, Row, json_of, read};
 
@@ -84,7 +84,7 @@ fn runs(folder: &Path) -> Result<Vec<(PathBuf, Option<String>)>, String> {
 
 /// The row of a run.
 fn row(folder: &Path, controller: Option<String>, physics: &str) -> Result<Row, String> {
-    let manifest: Value = json_of(&folder.join("run.json"))?;
+    let manifest = RunManifest::read(folder).map_err(|error| error.to_string())?;
     let path = folder.join("episodes.jsonl");
     let lines = fs::read_to_string(&path).map_err(|error| format!("{}: {error}", path.display()))?;
     let records: Vec<EpisodeRecord> = lines
@@ -92,13 +92,13 @@ fn row(folder: &Path, controller: Option<String>, physics: &str) -> Result<Row, 
         .map(|line| serde_json::from_str(line).map_err(|error| format!("{}: {error}", path.display())))
         .collect::<Result<_, _>>()?;
     let suite = records.first().map_or("", |record| &record.header.id.suite);
-    let summary = SuiteSummary::from_records(suite, &text(&manifest, "policy", folder)?, &records);
+    let summary = SuiteSummary::from_records(suite, &manifest.policy, &records);
     let rate = |of: softvt::evaluation::statistics::Rate| Rate {
         rate: of.rate.map(rounded),
         wilson95: of.wilson95.map(|ends| ends.map(rounded)),
     };
     Ok(Row {
-        script: text(&manifest, "script", folder)?,
+        script: manifest.script,
         controller: controller.unwrap_or(summary.policy),
         tasks: summary.by_task.len(),
         episodes: summary.scores.episodes,
@@ -109,8 +109,8 @@ fn row(folder: &Path, controller: Option<String>, physics: &str) -> Result<Row, 
         d_over_tau: median(&records, |record| record.verdict.object().ratio()),
         grip_ratio: median(&records, |record| record.verdict.object().grip_ratio),
         goal_time_s: median(&records, |record| record.verdict.goal_time_s),
-        softvt: text(&manifest, "softvt", folder)?,
-        seed: manifest["seed"].as_u64().unwrap_or_default(),
+        softvt: manifest.softvt,
+        seed: manifest.seed,
         physics: physics.to_owned(),
         suite: summary.suite,
     })

@@ -60,8 +60,7 @@ pub enum NeededKnowledge {
     Nothing,
     /// Its size, which shows.
     Size,
-    /// Stiffness, mass or friction, which do not show: the grip has to be found by trial. Earlier files say `touch`.
-    #[serde(alias = "touch")]
+    /// Stiffness, mass or friction, which do not show: the grip has to be found by trial.
     Trial,
 }
 

@@ -1,11 +1,10 @@
 //! [`RunChanges`]: what a run changes of its suite.
 
-use serde::{Deserialize, Serialize, de::Error};
-use serde_json::{Value, json};
-use sha2::{Digest, Sha256};
+use serde::{Deserialize, Serialize};
+use serde_json::json;
 
 use crate::ShiftValue;
-use softvt_common::text::{hex, significant};
+use softvt_common::{digest::sha256_hex, text::significant};
 
 /// What a run changes of its suite, and the seed of its draws. Each field is the value of one flag and, under its name,
 /// a key of `run.json`.
@@ -36,33 +35,6 @@ pub enum Twin {
 }
 
 impl RunChanges {
-    const KEYS: [&'static str; 7] = ["arguments", "shifts", "set", "twin", "vary", "seed", "seed_hash"];
-
-    /// Keys of `run.json` that hold what the changes amount to, whatever files and options state them. Runs that agree
-    /// in them, in the version and in their files have the same conditions.
-    pub const EFFECTS: [&'static str; 5] = ["twin", "variation", "shifts", "options", "settings"];
-
-    /// The changes of the run with this `run.json`.
-    ///
-    /// # Errors
-    /// A key is missing, or has a value of another type.
-    pub fn of_manifest(manifest: &Value) -> Result<Self, serde_json::Error> {
-        Self::deserialize(manifest).map_err(|error| match Self::invalid_key(manifest) {
-            Some(key) => serde_json::Error::custom(format!("{key}: {error}")),
-            None => error,
-        })
-    }
-
-    /// The key of a `run.json` whose value is not valid.
-    fn invalid_key(manifest: &Value) -> Option<&'static str> {
-        let is_valid = |key: &str| {
-            let mut others = json!(Self::default());
-            others[key] = manifest[key].clone();
-            Self::deserialize(others).is_ok()
-        };
-        Self::KEYS.into_iter().find(|key| !manifest[key].is_null() && !is_valid(key))
-    }
-
     /// True if soft objects are made rigid.
     pub fn is_rigid_twin(&self) -> bool {
         self.twin == Some(Twin::Rigid)
@@ -110,7 +82,7 @@ impl RunChanges {
     /// SHA-256 of the changes. A public seed is no part of it, since each episode is named with its own.
     pub fn hash(&self) -> String {
         let all = json!(Self { seed: 0, ..self.clone() });
-        hex(&Sha256::digest(all.to_string()))
+        sha256_hex(all.to_string())
     }
 }
 
@@ -128,19 +100,6 @@ mod tests {
             seed: 3,
             seed_hash: None,
         }
-    }
-
-    #[test]
-    fn changes_survive_the_way_through_run_json() {
-        let mut manifest = json!(changes());
-        assert_eq!((&manifest["twin"], &manifest["shifts"]), (&json!("rigid"), &json!([["mass", 2.0]])));
-        manifest["suite"] = json!("x");
-        assert_eq!(RunChanges::of_manifest(&manifest).unwrap(), changes());
-        let none = json!({ "arguments": [], "shifts": [], "set": [], "seed": 0, "twin": null });
-        assert_eq!(RunChanges::of_manifest(&none).unwrap(), RunChanges::default());
-        manifest["twin"] = json!("soft");
-        assert!(RunChanges::of_manifest(&manifest).is_err());
-        assert!(RunChanges::of_manifest(&json!({})).is_err(), "a run that says nothing may have any changes");
     }
 
     #[test]

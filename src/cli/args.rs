@@ -17,12 +17,14 @@ use softvt_benchmark::{Plan, ShiftValue, Suite, Task, Teacher};
 use softvt_common::text::is_control;
 use softvt_dataset::{OptionalStream, card::KeptOutcome};
 use softvt_policy::{profile::GripCode, remote::ServerProtocol};
-use softvt_report::stored_run::{self, StoredRun};
 use softvt_runner::{
     ConfiguredScript, EpisodeFilter, PolicyConfig, PolicyOptions, PolicySource, RunConfig, Shard,
     TraceDetail, parse_profile, read_secret, recording::RecordingOptions, selection::select_tasks,
 };
-use softvt_runs::requirement::Requirement;
+use softvt_runs::{
+    requirement::Requirement,
+    stored_run::{self, StoredRun},
+};
 use softvt_script::STANDARD_VARIATION;
 
 // The script, and changes of its scenes and their physics. A doc comment would replace the description of the commands

@@ -1,10 +1,11 @@
 //! What all layers share: the identity of an episode ([`episode_id`]), the flag that ends long loops ([`cancel`]), a
-//! [`disk_cache`], atomic [`files`], files of finished work ([`journal`]), declarations of
+//! [`disk_cache`], SHA-256 ([`digest`]), atomic [`files`], files of finished work ([`journal`]), declarations of
 //! [`settings`](mod@settings), numpy files ([`npy`]), jobs on threads ([`parallel`]), ranges of numbers ([`range`]),
 //! and numbers and [`text`] in messages.
 #![warn(missing_docs, unreachable_pub)]
 
 pub mod cancel;
+pub mod digest;
 pub mod disk_cache;
 pub mod episode_id;
 pub mod files;

@@ -14,6 +14,7 @@ use super::{
 };
 use softvt_common::files;
 use softvt_policy::profile::GripCode;
+use softvt_runs::manifest::ImportedFile;
 
 /// Demonstrations of a task.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -38,21 +39,6 @@ pub struct TaskCount {
     pub hdf5_bytes: u64,
     /// Size of its videos.
     pub video_bytes: u64,
-}
-
-/// A file of imported demonstrations.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct ImportedFile {
-    /// File name without folders.
-    pub file: String,
-    /// SHA-256, hexadecimal.
-    pub sha256: String,
-    /// Name of its format, such as SoftVTBench.
-    pub format: String,
-    /// Demonstrations in it.
-    pub demos: usize,
-    /// Source of the executed commands.
-    pub commands: String,
 }
 
 /// Contents of a dataset.

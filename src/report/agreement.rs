@@ -9,7 +9,7 @@ use crate::{
     condition_table::ConditionOutcome,
     leaderboard, page,
     run_summary::{summarize_runs, tests::stored},
-    sample_record, softvtbench_files,
+    sample_record,
     styled_text::TerminalFormat,
     tables, terminal,
 };
@@ -25,6 +25,7 @@ use softvt_evaluation::{
 use softvt_runs::{
     paired_stats::{PairedComparison, pair_episodes},
     record::EpisodeRecord,
+    softvtbench_files,
 };
 
 /// D_ref of the asset of the object, %.

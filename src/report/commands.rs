@@ -2,21 +2,18 @@
 
 use std::path::Path;
 
-use super::stored_run::StoredRun;
 use softvt_common::episode_id::EpisodeId;
 use softvt_evaluation::category::EpisodeCategory;
-use softvt_runs::record::EpisodeRecord;
+use softvt_runs::{manifest::RunManifest, record::EpisodeRecord, stored_run::StoredRun};
 
 /// The command that renders an episode.
 pub fn view_command(run: &StoredRun, id: &EpisodeId) -> String {
-    let manifest = &run.manifest;
-    let changes = run.changes();
+    let RunManifest { script: main, suite, sources, folder, .. } = &run.manifest;
+    let changes = run.manifest.changes();
     // Of a list of suites, the script that returns the suite itself: `view` does not accept a list.
-    let main = run.text("script");
-    let located = |path: &str| located(path, manifest["folder"].as_str());
-    let sibling = Path::new(main).with_file_name(format!("{}.lua", run.text("suite"))).display().to_string();
-    let is_listed = manifest["several_suites"] == true;
-    let is_main = !is_listed || sibling == main || manifest["sources"].get(&sibling).is_none();
+    let located = |path: &str| located(path, folder.as_deref());
+    let sibling = Path::new(main).with_file_name(format!("{suite}.lua")).display().to_string();
+    let is_main = !run.manifest.several_suites || sibling == *main || !sources.contains_key(&sibling);
     let mut view = vec![located(if is_main { main } else { &sibling })];
     if is_main {
         view.extend(changes.arguments.clone());
@@ -27,11 +24,12 @@ pub fn view_command(run: &StoredRun, id: &EpisodeId) -> String {
     if id.episode > 0 {
         add("--episode", id.episode.to_string());
     }
-    let policy = match (manifest["policy_file"].as_str(), manifest["replayed"]["run"].as_str()) {
+    let RunManifest { policy, policy_file, profile, replayed, .. } = &run.manifest;
+    let policy = match policy_file.as_ref().or(replayed.as_ref().map(|source| &source.run)) {
         // Neither a client of `softvt serve` nor a policy server can be called; their actions can be repeated.
-        _ if manifest["profile"].is_object() || manifest["served"] == true => run.dir.display().to_string(),
-        (Some(path), _) | (None, Some(path)) => located(path),
-        (None, None) => run.text("policy").to_owned(),
+        _ if profile.is_some() => run.dir.display().to_string(),
+        Some(path) => located(path),
+        None => policy.clone(),
     };
     add("--policy", policy);
     view.extend(changes.flags());
@@ -42,7 +40,7 @@ pub fn view_command(run: &StoredRun, id: &EpisodeId) -> String {
 
 /// The command that simulates an episode again.
 pub fn replay_command(run: &StoredRun, id: &EpisodeId) -> String {
-    let secret = if run.changes().seed_hash.is_some() { " --seed-file FILE" } else { "" };
+    let secret = if run.manifest.seed_hash.is_some() { " --seed-file FILE" } else { "" };
     format!("softvt replay {} {}/{}{secret}", quoted(&run.dir.display().to_string()), id.task, id.episode)
 }
 
@@ -97,10 +95,10 @@ mod tests {
     fn the_script_of_a_view_is_that_of_the_run_unless_it_returned_a_list() {
         let mut run = stored("runs/a", "noop", vec![sample_record()]);
         let id = run.records[0].header.id.clone();
-        let sibling = format!("{}.lua", run.text("suite"));
-        run.manifest["sources"] = serde_json::json!({ "x.lua": "", sibling.clone(): "" });
+        let sibling = format!("{}.lua", run.manifest.suite);
+        run.manifest.sources.insert(sibling.clone(), String::new());
         assert!(view_command(&run, &id).starts_with("softvt view x.lua "));
-        run.manifest["several_suites"] = true.into();
+        run.manifest.several_suites = true;
         assert!(view_command(&run, &id).starts_with(&format!("softvt view {sibling} ")));
     }
 

@@ -6,14 +6,11 @@ use std::{
 };
 
 use serde::Serialize;
-use serde_json::Value;
 
 use super::{
-    stored_run::{StoredRun, records_as},
     styled_text::{Emphasis, StyledText, TerminalFormat},
     task_names::{TaskName, task_names},
 };
-use softvt_benchmark::run_changes::RunChanges;
 use softvt_common::text::{TextColumn, TextTable, counted, decimal, shortened};
 use softvt_evaluation::stage::TaskStage;
 use softvt_runs::{
@@ -22,6 +19,7 @@ use softvt_runs::{
         pair_episodes,
     },
     record::{EpisodeHeader, EpisodeRecord},
+    stored_run::{StoredRun, records_as},
     summary::method_label,
 };
 
@@ -203,7 +201,7 @@ pub(super) fn check_unique(runs: &[StoredRun]) -> Result<(), CompareError> {
 
 /// Hash of the secret seed of a judged run.
 fn seed_hash(run: &StoredRun) -> String {
-    run.changes().seed_hash.unwrap_or_else(|| "none".to_owned())
+    run.manifest.seed_hash.clone().unwrap_or_else(|| "none".to_owned())
 }
 
 /// The error about two runs without common episodes, with the property in which they differ.
@@ -212,9 +210,9 @@ pub(super) fn no_common_episode(first: &[StoredRun], second: &[StoredRun]) -> Co
     let properties: [(&str, Property); 5] = [
         ("suite", |run| run.suite().to_owned()),
         ("seed hash", seed_hash),
-        ("seed", |run| run.changes().seed.to_string()),
-        ("split", |run| run.text("split").to_owned()),
-        ("tasks", |run| run.manifest["tasks"].to_string()),
+        ("seed", |run| run.manifest.seed.to_string()),
+        ("split", |run| run.manifest.split.name().to_owned()),
+        ("tasks", |run| format!("{:?}", run.manifest.tasks)),
     ];
     let differing = properties.iter().find_map(|(name, property)| {
         let [a, b] = [first, second].map(|runs| runs.iter().map(property).collect::<BTreeSet<_>>());
@@ -235,13 +233,13 @@ fn joined(names: &BTreeSet<String>) -> String {
 
 /// Policies of the runs, with their privileged inputs.
 fn policies(runs: &[StoredRun]) -> String {
-    let label = |run: &StoredRun| method_label(run.text("policy"), run.marks());
+    let label = |run: &StoredRun| method_label(&run.manifest.policy, run.marks());
     joined(&runs.iter().map(label).collect())
 }
 
 /// Names of folders with runs that differ: their policies, or their own names.
 pub(super) fn names(folders: &[impl AsRef<[StoredRun]>]) -> Vec<String> {
-    let policy = |runs: &[StoredRun]| joined(&runs.iter().map(|run| run.text("policy").to_owned()).collect());
+    let policy = |runs: &[StoredRun]| joined(&runs.iter().map(|run| run.manifest.policy.clone()).collect());
     let policies: Vec<String> = folders.iter().map(|runs| policy(runs.as_ref())).collect();
     let folder = |runs: &[StoredRun]| match runs {
         [run] => run.dir.clone(),
@@ -256,37 +254,14 @@ pub(super) fn names(folders: &[impl AsRef<[StoredRun]>]) -> Vec<String> {
     [&policies, &own].into_iter().find(differ).cloned().unwrap_or_else(numbered)
 }
 
-/// Fields of `run.json` about the conditions of a run in which two runs of one suite differ. Of files and limits, those
-/// that both runs read are compared, since a run of fewer tasks reads fewer; the differing ones follow in brackets.
+/// Fields of `run.json` about the conditions of a run in which two runs of one suite differ.
 pub(super) fn differing_fields(first: &[StoredRun], second: &[StoredRun]) -> BTreeSet<String> {
-    let fields = [&["softvt", "metric_id"], &RunChanges::EFFECTS[..], &KEYED_FIELDS].concat();
     let mut found = BTreeSet::new();
     for a in first {
         let Some(b) = second.iter().find(|b| b.suite() == a.suite()) else { continue };
-        found.extend(fields.iter().filter_map(|field| difference_of_field(a, b, field)));
+        found.extend(a.manifest.differing_conditions(&b.manifest));
     }
     found
-}
-
-/// Fields with an entry per file or asset.
-const KEYED_FIELDS: [&str; 2] = ["sources", LIMITS];
-/// Field with the limit τ of each asset.
-const LIMITS: &str = "thresholds";
-
-/// The field, if two runs differ in it, with the names of the differing entries.
-fn difference_of_field(a: &StoredRun, b: &StoredRun, field: &str) -> Option<String> {
-    let (a, b) = (&a.manifest[field], &b.manifest[field]);
-    if a == b {
-        return None;
-    }
-    let (Some(own), Some(other), true) = (a.as_object(), b.as_object(), KEYED_FIELDS.contains(&field)) else {
-        return Some(field.to_owned());
-    };
-    let other: BTreeMap<&str, &Value> = other.iter().map(|(name, value)| (in_project(name), value)).collect();
-    let own = own.iter().map(|(name, value)| (in_project(name), value));
-    let is_other = |(name, value): &(&str, &Value)| other.get(name).is_some_and(|x| x != value);
-    let names: Vec<&str> = own.filter(is_other).map(|(name, _)| name).collect();
-    (!names.is_empty()).then(|| format!("{field} ({})", names.join(", ")))
 }
 
 /// One sentence for each run whose scripts or limits differ from those of the first run of its suite.
@@ -298,8 +273,7 @@ pub fn difference_warnings<'a>(runs: impl Iterator<Item = &'a StoredRun>) -> Vec
             firsts.push(run);
             continue;
         };
-        let fields = KEYED_FIELDS.iter().filter_map(|field| difference_of_field(first, run, field));
-        let fields = fields.collect::<Vec<_>>().join(" and ");
+        let fields = first.manifest.differing_files(&run.manifest).join(" and ");
         if !fields.is_empty() {
             warnings.push(format!(
                 "{} and {} have different {fields}",
@@ -309,15 +283,6 @@ pub fn difference_warnings<'a>(runs: impl Iterator<Item = &'a StoredRun>) -> Vec
         }
     }
     warnings
-}
-
-/// The path of a file in its project, whatever the folder from which a run named it: `../scripts/shifts.lua` is
-/// `scripts/shifts.lua`.
-pub fn in_project(path: &str) -> &str {
-    let folders = ["scripts/", "suites/", "assets/"];
-    let starts = folders.iter().filter_map(|folder| path.find(folder));
-    let start = starts.filter(|at| *at == 0 || path[..*at].ends_with('/')).min();
-    start.map_or(path, |at| &path[at..])
 }
 
 /// The headings within the width of a column: their beginnings, or their ends where the beginnings are the same.
@@ -583,8 +548,6 @@ pub(super) fn interval(bounds: Option<[f64; 2]>, digits: usize) -> String {
 
 #[cfg(test)]
 mod tests {
-    use serde_json::json;
-
     use super::*;
     use crate::policy_ranking::PolicyRanking;
     use crate::{run_summary::tests::stored, sample_record};
@@ -651,32 +614,25 @@ mod tests {
     }
 
     #[test]
-    fn only_files_and_limits_that_both_runs_have_are_compared() {
-        let mut whole = run("a", 0.25, [None; 3]);
-        let mut part = run("b", 0.25, [None; 3]);
-        whole.manifest["sources"] = json!({ "x.lua": "1", "y.lua": "2", "z.lua": "3" });
-        part.manifest["sources"] = json!({ "x.lua": "1", "y.lua": "2" });
-        whole.manifest["thresholds"] = json!({ "bun": 1.0, "pie": 2.0 });
-        part.manifest["thresholds"] = json!({ "bun": 1.0 });
-        let differing = |part: &StoredRun| {
-            compare(&[whole.clone()], std::slice::from_ref(part)).expect("pairs").differing_fields
-        };
-        assert_eq!(differing(&part), [""; 0]);
-        part.manifest["sources"]["y.lua"] = json!("9");
-        assert_eq!(in_project("../a/scripts/experts/grasp.lua"), "scripts/experts/grasp.lua");
-        assert_eq!((in_project("x.lua"), in_project("my_suites/x.lua")), ("x.lua", "my_suites/x.lua"));
-        part.manifest["thresholds"]["bun"] = json!(1.5);
-        assert_eq!(differing(&part), ["sources (y.lua)", "thresholds (bun)"]);
+    fn differing_files_and_limits_of_runs_are_named() {
+        let (whole, mut part) = (run("a", 0.25, [None; 3]), run("b", 0.25, [None; 3]));
+        part.manifest.sources.insert("x.lua".to_owned(), "9".to_owned());
+        part.manifest.thresholds.insert("bun".to_owned(), Some(1.5));
+        let fields = ["sources (x.lua)", "thresholds (bun)"];
+        assert_eq!(
+            compare(std::slice::from_ref(&whole), std::slice::from_ref(&part))
+                .expect("pairs")
+                .differing_fields,
+            fields
+        );
         let warnings = difference_warnings([&whole, &part, &whole].into_iter());
-        assert_eq!(warnings, ["a and b have different sources (y.lua) and thresholds (bun)"]);
+        assert_eq!(warnings, ["a and b have different sources (x.lua) and thresholds (bun)"]);
         let three = PolicyRanking::new(&[&whole, &whole, &part].map(|run| vec![run.clone()]))
             .expect("common episodes");
-        assert_eq!(three.differing_fields, ["sources (y.lua)", "thresholds (bun)"]);
+        assert_eq!(three.differing_fields, fields);
         assert!(
-            three.table().contains("the runs also differ in sources (y.lua), thresholds (bun) (run.json)")
+            three.table().contains("the runs also differ in sources (x.lua), thresholds (bun) (run.json)")
         );
-        part.manifest["settings"] = json!({ "robot": 1 });
-        assert_eq!(differing(&part)[0], "settings");
     }
 
     #[test]
@@ -702,7 +658,7 @@ mod tests {
         };
         let (a, mut b) = (run("runs/a", 0.25, [None; 3]), run("runs/b", 0.25, [None; 3]));
         assert_eq!(heads(&a, &b), ["a", "b"], "one policy in two folders");
-        b.manifest["policy"] = json!("servo");
+        b.manifest.policy = "servo".to_owned();
         assert_eq!(heads(&a, &b), ["pi", "servo"]);
         let text = table(&compare(&[a], &[b]).expect("pairs"), TerminalFormat::PLAIN);
         let head: Vec<&str> = text.lines().nth(1).unwrap_or_default().split_whitespace().collect();

@@ -6,13 +6,13 @@ use std::collections::BTreeMap;
 use super::{
     comparison::{interval, signed},
     run_summary::RunSummary,
-    stored_run::{ConditionLabel, records_as},
     tables::{ResultTable, strings},
 };
 use softvt_evaluation::statistics::{Distribution, Rate};
 use softvt_runs::{
     paired_stats::{EpisodePair, PairedComparison, PairedDifference, pair_episodes},
     record::EpisodeRecord,
+    stored_run::{ConditionLabel, records_as},
     summary::GroupScores,
 };
 
@@ -212,10 +212,12 @@ impl ConditionEffects {
 mod tests {
     use std::path::Path;
 
-    use serde_json::json;
-
     use super::*;
-    use crate::{run_summary::summarize_runs, sample_record, stored_run::StoredRun};
+    use crate::{
+        run_summary::{summarize_runs, tests::shift},
+        sample_manifest, sample_record,
+    };
+    use softvt_runs::{manifest::RunManifest, stored_run::StoredRun};
 
     fn run(dir: &str, shifts: &[(&str, f64)], twin_of: Option<&str>, safe: &[bool]) -> StoredRun {
         let suite = if twin_of.is_some() { "twin" } else { "soft" };
@@ -227,10 +229,13 @@ mod tests {
         });
         StoredRun {
             dir: Path::new(dir).to_owned(),
-            manifest: json!({
-                "softvt": "x", "script": "x.lua", "suite": suite, "policy": "p", "seed": 0, "split": "validation",
-                "tasks": [0], "episodes": safe.len(), "shifts": shifts, "set": [], "arguments": [], "twin_of": twin_of,
-            }),
+            manifest: RunManifest {
+                suite: suite.to_owned(),
+                twin_of: twin_of.map(str::to_owned),
+                shifts: shifts.iter().map(|(name, value)| shift(name, *value)).collect(),
+                episodes: safe.len() as u32,
+                ..sample_manifest()
+            },
             records: records.collect(),
             is_finished: true,
             is_truncated: false,

@@ -4,7 +4,6 @@ use serde::Serialize;
 
 use super::{
     comparison::{self, signed},
-    stored_run::records_as,
     styled_text::{Emphasis, StyledText, TerminalFormat},
 };
 use softvt_benchmark::ShiftValue;
@@ -13,6 +12,7 @@ use softvt_evaluation::statistics::{Distribution, Rate};
 use softvt_runs::{
     paired_stats::{PairedComparison, PairedDifference, pair_episodes},
     record::EpisodeRecord,
+    stored_run::records_as,
     summary::GroupScores,
 };
 

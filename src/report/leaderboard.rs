@@ -1,25 +1,28 @@
 //! One JSON row per run, for leaderboards.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use serde::Serialize;
-use serde_json::{Value, json};
-use sha2::{Digest, Sha256};
+use serde_json::json;
 
-use super::{comparison::in_project, run_summary::RunSummary, stored_run::StoredRun};
-use softvt_common::text::hex;
+use super::run_summary::RunSummary;
+use softvt_benchmark::{NeededKnowledge, ShiftValue};
+use softvt_common::{digest::sha256_hex, episode_id::EpisodeSplit};
 use softvt_evaluation::statistics::Rate;
-use softvt_runs::summary::SuiteSummary;
+use softvt_runs::{
+    manifest::{RunManifest, in_project},
+    summary::SuiteSummary,
+};
 
 /// The results of one run, and all that they depend on.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 struct LeaderboardRow<'a> {
     benchmark: &'static str,
     /// Version of softvt that made the run.
-    version: &'a Value,
+    version: &'a str,
     suite: &'a str,
     /// What a safe grip needs besides the kind of the object.
-    needs: &'a Value,
+    needs: Option<NeededKnowledge>,
     policy: &'a str,
     /// Policy, its privileged inputs and changes of the suite.
     method: &'a str,
@@ -30,15 +33,15 @@ struct LeaderboardRow<'a> {
     /// True if it had the true forces on the pads.
     force_observed: bool,
     /// Base seed; null in a judged run, whose `seed_hash` is given.
-    seed: &'a Value,
-    seed_hash: &'a Value,
-    split: &'a Value,
-    shifts: &'a Value,
-    settings_changed: &'a Value,
+    seed: u64,
+    seed_hash: Option<&'a str>,
+    split: EpisodeSplit,
+    shifts: &'a [ShiftValue],
+    settings_changed: &'a [(String, String)],
     /// SHA-256 of the names and hashes of all files but that of the policy.
     sources_sha256: String,
     /// Those of softvt that the run has in another version.
-    modified: &'a Value,
+    modified: Option<&'a BTreeSet<String>>,
     /// Number of episodes of more than one attempt.
     repeated_episodes: usize,
     /// Number of episodes whose goal was reached without contact of the robot with a target.
@@ -55,7 +58,7 @@ struct LeaderboardRow<'a> {
     dsr: Option<Rate>,
     contact_safety: Rate,
     /// Definition of D.
-    metric_id: &'a Value,
+    metric_id: &'a str,
     /// Median of the peak of D, %.
     d_peak_median: Option<f64>,
     /// Median of the largest force on a pad over the least that holds the object.
@@ -66,24 +69,24 @@ impl<'a> LeaderboardRow<'a> {
     fn new(run: &'a RunSummary) -> Self {
         let RunSummary { run, summary, method } = run;
         let SuiteSummary { scores, .. } = summary;
-        let field = |name: &str| &run.manifest[name];
+        let manifest = &run.manifest;
         Self {
             benchmark: "softvt",
-            version: field("softvt"),
+            version: &manifest.softvt,
             suite: &summary.suite,
-            needs: field("needs"),
+            needs: manifest.needs,
             policy: &summary.policy,
             method,
             privileged: summary.privileged,
             replayed: summary.replayed,
             force_observed: summary.force_observed,
-            seed: field("seed"),
-            seed_hash: field("seed_hash"),
-            split: field("split"),
-            shifts: field("shifts"),
-            settings_changed: field("set"),
-            sources_sha256: sources_sha256(run),
-            modified: field("modified"),
+            seed: manifest.seed,
+            seed_hash: manifest.seed_hash.as_deref(),
+            split: manifest.split,
+            shifts: &manifest.shifts,
+            settings_changed: &manifest.set,
+            sources_sha256: sources_sha256(manifest),
+            modified: Some(&manifest.modified).filter(|files| !files.is_empty()),
             repeated_episodes: summary.repeated_episodes.len(),
             goals_untouched: summary.goals_untouched.len(),
             partial: run.is_partial(),
@@ -95,18 +98,17 @@ impl<'a> LeaderboardRow<'a> {
             safety: scores.safety_success_rate,
             dsr: scores.dsr,
             contact_safety: scores.contact_safety_rate,
-            metric_id: field("metric_id"),
+            metric_id: &manifest.metric_id,
             d_peak_median: scores.deformation.median,
             grip_ratio_median: scores.grip_ratio.median,
         }
     }
 }
 
-fn sources_sha256(run: &StoredRun) -> String {
-    let sources = run.manifest["sources"].as_object().into_iter().flatten();
-    let sources = sources.filter(|(name, _)| name.as_str() != run.text("policy_file"));
-    let sources: BTreeMap<&str, &Value> = sources.map(|(name, hash)| (in_project(name), hash)).collect();
-    hex(&Sha256::digest(json!(sources).to_string()))
+fn sources_sha256(RunManifest { sources, policy_file, .. }: &RunManifest) -> String {
+    let sources = sources.iter().filter(|(name, _)| Some(*name) != policy_file.as_ref());
+    let sources: BTreeMap<&str, &String> = sources.map(|(name, hash)| (in_project(name), hash)).collect();
+    sha256_hex(json!(sources).to_string())
 }
 
 /// The rows of runs as JSON lines, in their order.
@@ -117,6 +119,8 @@ pub fn rows(runs: &[RunSummary]) -> String {
 
 #[cfg(test)]
 mod tests {
+    use serde_json::Value;
+
     use super::*;
     use crate::{
         run_summary::{summarize_runs, tests::stored},

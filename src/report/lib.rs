@@ -1,9 +1,8 @@
-//! Run folders and everything derived from them: result tables, HTML report, videos, and files in SoftVTBench's format.
+//! Presentation of runs: result tables, comparison, HTML report, videos and MCAP files.
 //!
-//! [`stored_run`] reads run folders, [`run_summary`] summarises them, and the other modules write what is made of them.
+//! [`run_summary`] summarises stored runs, and the other modules show them.
 #![warn(missing_docs, unreachable_pub)]
 
-pub mod actions;
 #[cfg(test)]
 mod agreement;
 pub mod commands;
@@ -17,18 +16,20 @@ pub mod mcap;
 pub mod page;
 pub mod policy_ranking;
 pub mod report_files;
-pub mod run_check;
-pub mod run_folder;
 pub mod run_summary;
-pub mod shard_merge;
-pub mod softvtbench_files;
-pub mod stored_run;
 pub mod styled_text;
 pub mod tables;
 mod task_names;
 pub mod terminal;
 mod terminal_details;
 pub mod video;
+
+/// The manifest of a run of one episode, that of [`sample_record`].
+#[cfg(test)]
+pub(crate) fn sample_manifest() -> softvt_runs::manifest::RunManifest {
+    let manifest = serde_json::from_str(include_str!("../../tests/data/run.json")).expect("a valid manifest");
+    softvt_runs::manifest::RunManifest { softvt: env!("CARGO_PKG_VERSION").to_owned(), ..manifest }
+}
 
 /// A successful, safe soft episode.
 #[cfg(test)]

@@ -4,16 +4,14 @@ use std::{cmp::Reverse, collections::BTreeSet};
 
 use serde::Serialize;
 
-use super::{
-    comparison::{CompareError, check_unique, differing_fields, names, no_common_episode, records},
-    stored_run::StoredRun,
-};
+use super::comparison::{CompareError, check_unique, differing_fields, names, no_common_episode, records};
 use softvt_common::text::{TextColumn, TextTable, counted, decimal, shortened};
 use softvt_evaluation::{category::EpisodeCategory, statistics::Rate};
 use softvt_runs::{
     paired_stats::{EpisodePair, PairedComparison, pair_episodes},
     paired_tests::{holm, letters},
     record::EpisodeRecord,
+    stored_run::StoredRun,
     summary::{GroupScores, method_label},
 };
 

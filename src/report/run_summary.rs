@@ -2,11 +2,12 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use super::{comparison::difference_warnings, stored_run::StoredRun};
+use super::comparison::difference_warnings;
 use softvt_common::text::decimal;
 use softvt_evaluation::{drop::DropReason, verdict::Outcome};
 use softvt_runs::{
     record::EpisodeRecord,
+    stored_run::StoredRun,
     summary::{MethodMarks, SuiteSummary},
 };
 
@@ -58,7 +59,7 @@ pub fn summarize_runs(mut runs: Vec<StoredRun>) -> Vec<RunSummary> {
 }
 
 fn summarize(run: StoredRun) -> RunSummary {
-    let mut summary = SuiteSummary::from_records(run.suite(), run.text("policy"), &run.records);
+    let mut summary = SuiteSummary::from_records(run.suite(), &run.manifest.policy, &run.records);
     // An unfinished run has no episode yet that says so.
     let MethodMarks { privileged, replayed, force_observed } = run.marks();
     summary.privileged |= privileged;
@@ -66,7 +67,7 @@ fn summarize(run: StoredRun) -> RunSummary {
     summary.force_observed |= force_observed;
     let mut method = summary.method_label();
     // Changes to the suite, such as `mass=2`.
-    let changes = run.changes().assignments();
+    let changes = run.manifest.changes().assignments();
     if !changes.is_empty() {
         method += &format!(" · {}", changes.join(", "));
     }
@@ -167,11 +168,16 @@ pub fn unsafe_reason(record: &EpisodeRecord) -> Option<String> {
 pub(super) mod tests {
     use std::path::Path;
 
-    use serde_json::json;
-
     use super::*;
-    use crate::sample_record;
+    use crate::{sample_manifest, sample_record};
+    use softvt_benchmark::ShiftValue;
     use softvt_evaluation::{drop::DropEvent, stage::TaskStage};
+    use softvt_runs::manifest::{ReplaySource, RunManifest};
+
+    /// A shift of a run.
+    pub(crate) fn shift(name: &str, value: f64) -> ShiftValue {
+        ShiftValue { name: name.to_owned(), value }
+    }
 
     /// A finished run of `records` in the folder `dir`.
     pub(crate) fn stored(dir: &str, policy: &str, mut records: Vec<EpisodeRecord>) -> StoredRun {
@@ -179,19 +185,21 @@ pub(super) mod tests {
             (record.header.policy, record.header.privileged) = (policy.into(), policy == "expert");
         }
         let suite = records.first().map_or("suite", |record| &record.header.id.suite);
-        let manifest = json!({
-            "softvt": env!("CARGO_PKG_VERSION"), "script": "x.lua", "suite": suite, "policy": policy,
-            "privileged": policy == "expert", "seed": 11, "split": "eval", "tasks": [0], "force_observed": false,
-            "episodes": records.len(), "shifts": [], "set": [], "arguments": [],
-        });
+        let manifest = RunManifest {
+            suite: suite.to_owned(),
+            policy: policy.to_owned(),
+            privileged: policy == "expert",
+            episodes: records.len() as u32,
+            ..sample_manifest()
+        };
         StoredRun { dir: Path::new(dir).into(), manifest, records, is_finished: true, is_truncated: false }
     }
 
     #[test]
     fn conditions_follow_their_reference_in_the_order_of_values() {
-        let run = |dir: &str, policy: &str, shift: Option<(&str, f64)>| {
+        let run = |dir: &str, policy: &str, change: Option<(&str, f64)>| {
             let mut run = stored(dir, policy, vec![sample_record()]);
-            run.manifest["shifts"] = json!(shift.into_iter().collect::<Vec<_>>());
+            run.manifest.shifts.extend(change.map(|(name, value)| shift(name, value)));
             run
         };
         let runs = vec![
@@ -209,10 +217,10 @@ pub(super) mod tests {
     fn runs_of_one_suite_have_distinct_names() {
         let plain = stored("runs/a", "expert", vec![sample_record()]);
         let mut heavy = stored("runs/b", "expert", vec![sample_record()]);
-        heavy.manifest["shifts"] = json!([["mass", 2.0]]);
-        heavy.manifest["set"] = json!([["robot.gripper.effort", "3"]]);
+        heavy.manifest.shifts.push(shift("mass", 2.0));
+        heavy.manifest.set.push(("robot.gripper.effort".to_owned(), "3".to_owned()));
         let mut forces = stored("runs/c", "pi", vec![sample_record()]);
-        forces.manifest["force_observed"] = json!(true);
+        forces.manifest.force_observed = true;
         let names = |runs: &[&StoredRun]| -> Vec<String> {
             summarize_runs(runs.iter().map(|run| (*run).clone()).collect())
                 .into_iter()
@@ -238,9 +246,15 @@ pub(super) mod tests {
     #[test]
     fn recorded_actions_and_names_of_privileged_policies_are_marked_whatever_the_record_says() {
         let mut replayed = stored("a", "pi05", vec![sample_record()]);
-        replayed.manifest["replayed"] = json!({ "policy": "x", "privileged": false });
+        replayed.manifest.replayed = Some(ReplaySource {
+            run: "b".to_owned(),
+            policy: "x".to_owned(),
+            privileged: false,
+            force_observed: false,
+            sha256: String::new(),
+        });
         let mut named = stored("b", "expert-binary", vec![sample_record()]);
-        named.manifest["privileged"] = json!(false);
+        named.manifest.privileged = false;
         let runs = summarize_runs(vec![replayed, named]);
         let methods: Vec<&str> = runs.iter().map(|run| run.method.as_str()).collect();
         assert_eq!(methods, ["pi05 (replayed)", "expert-binary (privileged)"]);

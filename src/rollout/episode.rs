@@ -21,7 +21,6 @@ use super::{
     simulation::{Simulation, placed_at, state_hash},
     trace::StepTrace,
 };
-use sha2::{Digest, Sha256};
 use softvt_common::cancel;
 
 use softvt_benchmark::{
@@ -31,7 +30,6 @@ use softvt_benchmark::{
     steps_per_control,
 };
 use softvt_common::episode_id::EpisodeId;
-use softvt_common::text::hex;
 use softvt_evaluation::{
     deformation::ReferenceShape,
     judge::{ControlStepScore, Judge, JudgeConfig},
@@ -46,7 +44,10 @@ use softvt_physics::{
 };
 use softvt_policy::{Action, Observation, PolicyError, SensorStreams};
 use softvt_robot::{Side, ik::ArmAngles, panda::ARM_DOFS, rotation};
-use softvt_runs::record::{EpisodeHeader, EpisodeRecord, RolloutStats, UnreachableCommand};
+use softvt_runs::{
+    actions,
+    record::{EpisodeHeader, EpisodeRecord, RolloutStats, UnreachableCommand},
+};
 use softvt_scene::{Asset, Body, Camera, Scene};
 use softvt_sensing::{camera::RenderScene, tactile::TactileReading};
 
@@ -633,7 +634,7 @@ impl Episode {
             gave_up,
             notes: BTreeMap::new(),
             metrics: self.metrics(),
-            actions_sha256: checksum(&self.actions),
+            actions_sha256: actions::sha256(&self.actions),
             state_hash: state_hash(&self.sim),
         };
         let outcome = self.outcome.clone().unwrap_or(Outcome::Budget);
@@ -674,15 +675,6 @@ impl Episode {
             unended: None,
         }
     }
-}
-
-/// SHA-256 of actions, as little-endian float64 numbers; hexadecimal.
-pub fn checksum(actions: &[Action]) -> String {
-    let mut hash = Sha256::new();
-    for number in actions.iter().flat_map(|action| action.numbers()) {
-        hash.update(number.to_le_bytes());
-    }
-    hex(&hash.finalize())
 }
 
 /// Rounding error of a closure.

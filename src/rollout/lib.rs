@@ -98,7 +98,7 @@ pub use asset_cache::AssetCache;
 pub use build::MAX_OVERLAP;
 pub use build_error::SceneBuildError;
 pub use controller::{ChunkedPolicy, Controller};
-pub use episode::{Episode, EpisodeSpec, FinishedEpisode, checksum, target_asset};
+pub use episode::{Episode, EpisodeSpec, FinishedEpisode, target_asset};
 pub use episode_error::EpisodeError;
 pub use goal_in_scene::{GoalAtStart, StatePredicate, check_goal};
 pub use metric::{MeasuredMetric, StateFunction};

@@ -18,11 +18,11 @@ use crate::{
 };
 use softvt_benchmark::{Condition, ObjectType, Plan, REFERENCE, ShiftValue, Suite, Task, settings::Settings};
 use softvt_common::{files::replace, text};
-use softvt_report::{
-    condition_table::{ConditionOutcome, ConditionRow, ConditionTable},
+use softvt_report::condition_table::{ConditionOutcome, ConditionRow, ConditionTable};
+use softvt_runs::{
     run_folder::RunFolder,
+    summary::{MethodMarks, method_label},
 };
-use softvt_runs::summary::{MethodMarks, method_label};
 use softvt_script::LoadedScript;
 
 /// Name of the file with the comparison of all suites, in the folder above all runs.

@@ -14,12 +14,15 @@ use softvt_common::episode_id::EpisodeIndex;
 use softvt_common::files;
 use softvt_evaluation::judge::ControlStepScore;
 use softvt_report::{
-    actions, mcap,
-    softvtbench_files::{self, DebugFrame, DebugShape},
+    mcap,
     video::{self, VideoCaption},
 };
 use softvt_rollout::FinishedEpisode;
-use softvt_runs::record::EpisodeRecord;
+use softvt_runs::{
+    actions,
+    record::EpisodeRecord,
+    softvtbench_files::{self, DebugFrame, DebugShape},
+};
 
 /// Episodes of a run that become videos or MCAP files.
 #[derive(Clone, Debug, PartialEq, Eq)]

@@ -5,7 +5,7 @@ use std::ops::Range;
 use softvt_benchmark::Task;
 use softvt_common::episode_id::EpisodeIndex;
 
-use crate::config::Shard;
+use softvt_runs::shard::Shard;
 
 /// An episode to run.
 #[derive(Clone, Copy, Debug)]

@@ -8,8 +8,7 @@ use crate::{
 };
 use softvt_common::{episode_id::EpisodeIndex, text::counted};
 use softvt_dataset::manifest::{self, ManifestEntry};
-use softvt_report::stored_run::StoredRun;
-use softvt_runs::record::EpisodeRecord;
+use softvt_runs::{record::EpisodeRecord, stored_run::StoredRun};
 
 /// An episode of a run, or a demonstration of a dataset.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

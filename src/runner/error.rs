@@ -111,10 +111,10 @@ input_errors!(
     serde_json::Error,
     softvt_dataset::DatasetError,
     softvt_evaluation::thresholds::ThresholdError,
-    softvt_report::actions::ActionsError,
     softvt_report::mcap::EpisodeMcapError,
-    softvt_report::run_folder::RunFolderError,
-    softvt_report::stored_run::StoredRunError,
     softvt_report::video::EpisodeVideoError,
+    softvt_runs::actions::ActionsError,
+    softvt_runs::run_folder::RunFolderError,
+    softvt_runs::stored_run::StoredRunError,
     softvt_script::ScriptError,
 );

@@ -1,21 +1,16 @@
 //! Evaluation of a policy on a suite. With a folder, an interrupted run can be continued.
 
 use std::{
-    collections::BTreeSet,
     path::{Path, PathBuf},
     sync::Arc,
 };
 
-use serde::Serialize;
-
 use crate::{
-    attempts::Attempts,
     config::RunConfig,
     episode_list::{EpisodeJob, EpisodeList},
     error::{RunError, RunErrorCause},
     observer::JobList,
     replay::{difference, replay_factory, with_policy_fields},
-    run_manifest::{self, RunManifest},
     stored_scripts::StoredScripts,
     suite_run::PreparedRun,
 };
@@ -24,14 +19,16 @@ use softvt_common::episode_id::EpisodeIndex;
 use softvt_common::{files, parallel, text::counted};
 use softvt_evaluation::{category::EpisodeCategory, verdict::Outcome};
 use softvt_policy::PolicyError;
-use softvt_report::{
-    actions,
-    run_check::{RecordContradiction, first_contradiction},
-    run_folder::{EPISODES, RUN, RunFolder, SUMMARY},
-    softvtbench_files,
-};
 use softvt_rollout::{Episode, FinishedEpisode};
-use softvt_runs::{record::EpisodeRecord, summary::SuiteSummary};
+use softvt_runs::{
+    actions,
+    attempts::Attempts,
+    manifest::RunManifest,
+    record::EpisodeRecord,
+    run_folder::{RUN, RunFolder, SUMMARY},
+    softvtbench_files,
+    summary::SuiteSummary,
+};
 
 /// The episodes of a finished run, in order, with their summary.
 #[derive(Clone, Debug)]
@@ -75,73 +72,21 @@ pub(crate) struct RunLog<'a> {
 }
 
 impl<'a> RunLog<'a> {
-    /// Takes over an open folder and its records. Writes the manifest of the run.
+    /// Creates the folder of a run, or with `resume` continues it.
     ///
     /// # Errors
-    /// The folder is of another run, or the manifest cannot be written.
-    pub(crate) fn new(
-        run: &'a PreparedRun,
-        folder: RunFolder,
-        records: Vec<EpisodeRecord>,
-        manifest: &impl Serialize,
-    ) -> Result<Self, RunError> {
+    /// The folder is of another run or anything else, or cannot be written.
+    pub(crate) fn open(run: &'a PreparedRun, manifest: &RunManifest, resume: bool) -> Result<Self, RunError> {
+        let (folder, records) = match resume {
+            true => RunFolder::resume(&run.out, manifest)?,
+            false => (RunFolder::create(&run.out, manifest)?, Vec::new()),
+        };
         let attempts = match run.config.policy.is_outside() {
             true => Some(Arc::new(Attempts::open(folder.path())?)),
             false => None,
         };
-        let log = Self { run, folder, records, attempts };
-        log.check_records()?;
-        run_manifest::write_or_compare(log.folder.path(), manifest)?;
-        StoredScripts::new(run.loaded, run.calibration_files.texts()).write(log.folder.path())?;
-        log.check_contradictions(manifest)?;
-        Ok(log)
-    }
-
-    /// Checks that all records are episodes of this run, each at most once.
-    fn check_records(&self) -> Result<(), RunError> {
-        let (run, config) = (self.run, self.run.config);
-        let path = run.out.join(EPISODES).display().to_string();
-        if !self.records.is_empty() && self.folder.read(RUN)?.is_none() {
-            return Err(RunError::input(format!(
-                "{path}: there is no {RUN} next to it, so its run is not known"
-            )));
-        }
-        let mut seen = BTreeSet::new();
-        for (number, record) in self.records.iter().enumerate() {
-            let (header, id, index) = (&record.header, &record.header.id, record.header.id.index());
-            let is_own = id.suite == run.name
-                && id.base_seed == config.base_seed()
-                && header.policy == config.policy.name;
-            let problem = if !is_own || run.jobs.find(index).is_none() {
-                let (seed, policy) = (id.base_seed, &header.policy);
-                let own = (config.base_seed(), &config.policy.name);
-                match is_own {
-                    true => "belongs to another run: this command does not ask for it; resume with the original arguments".to_owned(),
-                    false => format!(
-                        "belongs to another run: {} with seed {seed} and {policy}, and this command has {} with seed {} and \
-                         {}; select another output folder, or resume with the original arguments",
-                        id.suite, run.name, own.0, own.1
-                    ),
-                }
-            } else if !seen.insert(index) {
-                "occurs twice".to_owned()
-            } else {
-                continue;
-            };
-            return Err(RunError::input(format!("{path}:{}: {index} {problem}", number + 1)));
-        }
-        Ok(())
-    }
-
-    /// Checks that no record contradicts the manifest of the run.
-    fn check_contradictions(&self, manifest: &impl Serialize) -> Result<(), RunError> {
-        let manifest = serde_json::to_value(manifest).unwrap_or_default();
-        first_contradiction(&manifest, &self.records).map_or(Ok(()), |RecordContradiction { line, what }| {
-            Err(RunError::input(format!(
-                "{}:{line}: the record contradicts {RUN}: {what}; it was changed after the episode",
-                self.run.out.join(EPISODES).display()
-            )))
-        })
+        StoredScripts::new(run.loaded, run.calibration_files.texts()).write(folder.path())?;
+        Ok(Self { run, folder, records, attempts })
     }
 
     /// Runs jobs of a list. Writes the files of each finished episode, and then its line.
@@ -221,7 +166,7 @@ impl<'a> RunLog<'a> {
     /// The file cannot be written.
     pub(crate) fn write_summary(&self) -> Result<(), RunError> {
         files::write_json(&self.run.out.join(SUMMARY), &self.summary())?;
-        self.attempts.as_ref().map_or(Ok(()), |attempts| attempts.remove())
+        Ok(self.attempts.as_ref().map_or(Ok(()), |attempts| attempts.remove())?)
     }
 
     /// Summary of the episodes so far.
@@ -261,15 +206,10 @@ pub(crate) fn run_suite(
     on_episode: &mut dyn FnMut(&EpisodeRecord),
 ) -> Result<SuiteResult, RunError> {
     let config = run.config;
-    let manifest = RunManifest::new(run, config.episodes_of(run.suite));
+    let manifest = run.manifest(config.episodes_of(run.suite));
     // The same command again on a finished folder changes nothing, even without --resume.
-    let finished = is_finished(&run.out) && run_manifest::is_in(&run.out, &manifest)?;
-    let opened = match config.resume || finished {
-        true => RunFolder::resume(&run.out),
-        false => RunFolder::create(&run.out).map(|folder| (folder, Vec::new())),
-    };
-    let (folder, records) = opened.map_err(|error| config.error(error))?;
-    let mut log = RunLog::new(run, folder, records, &manifest)?;
+    let finished = is_finished(&run.out) && manifest.is_in(&run.out);
+    let mut log = RunLog::open(run, &manifest, config.resume || finished)?;
     let artifacts = run.artifacts();
     let remaining = run.jobs.without(log.records.iter().map(|record| record.header.id.index()));
     let out = run.out.display();
@@ -491,6 +431,7 @@ mod tests {
     use softvt_benchmark::Task;
     use softvt_policy::{Action, ActionChunk, EpisodeBrief, Observation, Policy, SensorStreams};
     use softvt_rollout::{ChunkedPolicy, Controller};
+    use softvt_runs::run_folder::EPISODES;
     use softvt_script::EpisodeSetup;
 
     /// Requests the true forces, holds still, and fails without them.

@@ -6,13 +6,11 @@ use std::{
     sync::Arc,
 };
 
-use serde::Serialize;
 use serde_json::Value;
 
 use crate::{
     config::{ConfiguredScript, RunConfig},
     error::RunError,
-    experiment_folder::{ExperimentFolder, FinishedPoint, RESERVED},
 };
 use softvt_benchmark::Plan;
 use softvt_common::cancel;
@@ -20,29 +18,12 @@ use softvt_common::{
     files::replace,
     text::{TextTable, counted, is_misspelt, significant, unknown_name},
 };
-use softvt_report::run_folder::RunFolder;
-use softvt_script::{
-    Experiment, ExperimentInput, ExperimentInputError, ExperimentRow, LoadedScript, OptionSpec,
+use softvt_runs::{
+    experiment_folder::{ExperimentFolder, ExperimentRow, FinishedPoint, RESERVED},
+    manifest::{ExperimentManifest, VERSION, working_folder},
+    run_folder::RunFolder,
 };
-
-/// `run.json` of an experiment.
-#[derive(Serialize)]
-struct ExperimentManifest<'a> {
-    /// Version of softvt.
-    softvt: &'a str,
-    script: &'a str,
-    experiment: &'a str,
-    points: usize,
-    seed: u64,
-    /// Values of all options of the script.
-    options: BTreeMap<String, String>,
-    /// Options of the script as they were typed.
-    arguments: &'a [String],
-    /// The settings that are not those of the script.
-    set: &'a [(String, String)],
-    /// SHA-256 of files by name.
-    sources: BTreeMap<String, String>,
-}
+use softvt_script::{Experiment, ExperimentInput, ExperimentInputError, LoadedScript, OptionSpec};
 
 /// Results of an experiment, as they become known.
 pub enum ExperimentOutput<'a> {
@@ -108,9 +89,10 @@ pub fn run<E: From<RunError>>(
         Some(dir) => {
             let manifest = manifest(config, loaded, name, points);
             let (folder, finished) = match config.resume {
-                true => ExperimentFolder::resume(dir, &manifest)?,
-                false => (ExperimentFolder::create(dir, &manifest)?, BTreeMap::new()),
-            };
+                true => ExperimentFolder::resume(dir, &manifest),
+                false => ExperimentFolder::create(dir, &manifest).map(|folder| (folder, BTreeMap::new())),
+            }
+            .map_err(RunError::from)?;
             (Some(folder), finished)
         }
         None => (None, BTreeMap::new()),
@@ -156,26 +138,26 @@ pub fn run<E: From<RunError>>(
         return Err(RunError { resumable: Some(dir.into()), ..RunError::interrupted(done) }.into());
     }
     if outcome.is_err() && finished.is_empty() {
-        folder.take().map_or(Ok(()), ExperimentFolder::discard)?;
+        folder.take().map_or(Ok(()), ExperimentFolder::discard).map_err(RunError::from)?;
     }
     outcome?;
     // Points of an earlier process may have used what these did not.
     if left.len() == points
         && let Err(error) = input.check_used()
     {
-        folder.take().map_or(Ok(()), ExperimentFolder::discard)?;
+        folder.take().map_or(Ok(()), ExperimentFolder::discard).map_err(RunError::from)?;
         return Err(input_error(config, &error).into());
     }
     if left.len() == points
         && let Some(problem) = problem_of(&rows, columns)
     {
-        folder.take().map_or(Ok(()), ExperimentFolder::discard)?;
+        folder.take().map_or(Ok(()), ExperimentFolder::discard).map_err(RunError::from)?;
         return Err(config.error(problem).into());
     }
     // The rows are kept if finish fails.
     on_output(ExperimentOutput::Rows(&rows))?;
     if let Some(folder) = &mut folder {
-        folder.write_rows(&finished, columns)?;
+        folder.write_rows(&finished, columns).map_err(RunError::from)?;
     }
     let finish = open()?.finish(&rows).map_err(RunError::from)?;
     if let Some(text) = &finish.text {
@@ -217,23 +199,19 @@ fn problem_of(rows: &[ExperimentRow], columns: &[String]) -> Option<String> {
     })
 }
 
-fn manifest<'a>(
-    config: &'a RunConfig,
-    loaded: &'a LoadedScript,
-    name: &'a str,
-    points: usize,
-) -> ExperimentManifest<'a> {
+fn manifest(config: &RunConfig, loaded: &LoadedScript, name: &str, points: usize) -> ExperimentManifest {
     let options = loaded.options.iter();
     ExperimentManifest {
-        softvt: env!("CARGO_PKG_VERSION"),
-        script: &loaded.sources.main,
-        experiment: name,
+        softvt: VERSION.to_owned(),
+        script: loaded.sources.main.clone(),
+        experiment: name.to_owned(),
         points,
         seed: config.base_seed(),
         options: options.map(|option| (option.name.clone(), format!("{:?}", option.value))).collect(),
-        arguments: &config.options,
-        set: &config.settings,
+        arguments: config.options.clone(),
+        set: config.settings.clone(),
         sources: loaded.sources.bundle.hashes(),
+        folder: working_folder(),
     }
 }
 

@@ -6,7 +6,6 @@
 //! here prints: progress and messages go to an [`Observer`].
 #![warn(missing_docs, unreachable_pub)]
 
-mod attempts;
 pub mod bench_growth;
 pub mod bench_rates;
 mod check;
@@ -19,7 +18,6 @@ pub mod episode_selector;
 mod error;
 mod evaluate;
 pub mod experiment;
-mod experiment_folder;
 mod friction;
 mod golden_episode;
 pub mod import;
@@ -43,7 +41,7 @@ mod suite_run;
 mod thumbnails;
 
 pub use check::SuiteChecker;
-pub use config::{ConfiguredScript, RunConfig, Shard, TraceDetail, plan_noun, read_secret, thread_count};
+pub use config::{ConfiguredScript, RunConfig, TraceDetail, plan_noun, read_secret, thread_count};
 pub use episode_artifacts::EpisodeFilter;
 pub use episode_list::{EpisodeJob, EpisodeList};
 pub use error::{FaultySetting, RunError, RunErrorCause};
@@ -58,6 +56,7 @@ pub use record::{DemoCount, record};
 pub use runner::Runner;
 pub use served_runs::ServedRuns;
 pub use serving::SuiteServer;
+pub use softvt_runs::shard::Shard;
 pub use stored_scripts::StoredScripts;
 pub use suite_run::{PreparedRun, SuiteRun};
 pub use thumbnails::thumbnails;

@@ -13,7 +13,7 @@ use std::{
 
 use crate::{error::RunError, observer::Observer, stored_scripts::StoredScripts};
 use softvt_common::episode_id::EpisodeIndex;
-use softvt_common::{files, parallel::lock, text::counted};
+use softvt_common::{digest::sha256_hex, files, parallel::lock, text::counted};
 use softvt_evaluation::{
     instance::{InstanceFactors, InstancePresses},
     safety::{DeformationLimit, NOMINAL_KAPPA},
@@ -158,7 +158,7 @@ impl CalibrationFiles {
             .find(&relative_path)?
             .map(|ProjectFile { text, path }| -> Result<_, RunError> {
                 let thresholds = ThresholdFile::parse(&text, &path)?;
-                let sha256 = softvt_script::sha256(text.as_bytes());
+                let sha256 = sha256_hex(&text);
                 Ok(Arc::new(CalibrationFile { relative_path, path, sha256, text, thresholds }))
             })
             .transpose()?;

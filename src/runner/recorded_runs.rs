@@ -2,7 +2,6 @@
 
 use std::path::{Path, PathBuf};
 
-use serde::Serialize;
 use sha2::{Digest, Sha256};
 
 use crate::{episode_list::EpisodeList, error::RunError};
@@ -10,8 +9,9 @@ use softvt_common::episode_id::{EpisodeIndex, EpisodeSplit};
 use softvt_common::files::FileError;
 use softvt_common::text::hex;
 use softvt_policy::{Action, EpisodeBrief};
-use softvt_report::{
+use softvt_runs::{
     actions,
+    manifest::ReplaySource,
     run_folder::EPISODES,
     stored_run::{self, StoredRun},
 };
@@ -26,21 +26,6 @@ pub(crate) struct RecordedRuns {
     runs: Vec<StoredRun>,
 }
 
-/// The run whose actions are repeated, as `run.json` names it.
-#[derive(Clone, Debug, Serialize)]
-pub(crate) struct ReplaySource {
-    /// The folder, as it was typed.
-    pub run: String,
-    /// Name of the recorded policy.
-    pub policy: String,
-    /// True if the recorded policy had access to ground-truth state.
-    pub privileged: bool,
-    /// True if the recorded policy observed the true forces on the pads.
-    pub force_observed: bool,
-    /// SHA-256 of the episodes and their actions.
-    pub sha256: String,
-}
-
 impl RecordedRuns {
     /// Reads a run folder, or all run folders in a folder.
     ///
@@ -52,7 +37,7 @@ impl RecordedRuns {
     }
 
     fn run_of(&self, suite: &str, is_twin: bool) -> Option<&StoredRun> {
-        self.runs.iter().find(|run| run.text("suite") == suite && is_rigid_twin(run) == is_twin)
+        self.runs.iter().find(|run| run.manifest.suite == suite && is_rigid_twin(run) == is_twin)
     }
 
     /// The run of a suite whose actions the policy repeats.
@@ -70,19 +55,19 @@ impl RecordedRuns {
     ) -> Result<ReplaySource, RunError> {
         let run = self.run_of(suite, is_twin).ok_or_else(|| {
             let available: Vec<String> =
-                self.runs.iter().map(|run| suite_label(run.text("suite"), is_rigid_twin(run))).collect();
+                self.runs.iter().map(|run| suite_label(&run.manifest.suite, is_rigid_twin(run))).collect();
             let (suite, available) = (suite_label(suite, is_twin), available.join(", "));
             let message = format!("no run of suite {suite}; available: {available}");
             RunError::of_setting("policy", self.dir.display(), message)
         })?;
         let refuse = |message: String| Err(RunError::of_setting("policy", run.dir.display(), message));
-        let seed = run.changes().seed;
-        if seed != base_seed {
-            return refuse(format!("its seed is {seed}, that of this run {base_seed}"));
+        let manifest = &run.manifest;
+        if manifest.seed != base_seed {
+            return refuse(format!("its seed is {}, that of this run {base_seed}", manifest.seed));
         }
-        let (split, own) = (run.text("split"), split.name());
-        if split != own {
-            return refuse(format!("its split is {split}, that of this run {own}"));
+        if manifest.split != split {
+            let (other, own) = (manifest.split.name(), split.name());
+            return refuse(format!("its split is {other}, that of this run {own}"));
         }
         let missing = requested.without(episodes_with_actions(run));
         if !missing.is_empty() {
@@ -104,9 +89,9 @@ impl RecordedRuns {
         }
         Ok(ReplaySource {
             run: run.dir.display().to_string(),
-            policy: run.text("policy").to_owned(),
-            privileged: run.is_privileged(),
-            force_observed: run.observes_forces(),
+            policy: manifest.policy.clone(),
+            privileged: manifest.is_privileged(),
+            force_observed: manifest.force_observed,
             sha256: digest(run)?,
         })
     }
@@ -135,7 +120,7 @@ fn suite_label(suite: &str, is_twin: bool) -> String {
 }
 
 fn is_rigid_twin(run: &StoredRun) -> bool {
-    run.changes().is_rigid_twin()
+    run.manifest.twin.is_some()
 }
 
 fn episodes_with_actions(run: &StoredRun) -> impl Iterator<Item = EpisodeIndex> {

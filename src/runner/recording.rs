@@ -20,7 +20,6 @@ use crate::{
     error::RunError,
     evaluate::{RunLog, SimulatedEpisode, with_kept},
     policy::ControllerFactory,
-    run_manifest::{self, RunManifest},
     selection::path_component,
     suite_run::{PreparedRun, SuiteRun},
 };
@@ -43,9 +42,13 @@ use softvt_dataset::{
 };
 use softvt_evaluation::verdict::Outcome;
 use softvt_policy::{builtin::RecordedPolicy, profile::GripCode};
-use softvt_report::{actions, run_folder::RunFolder};
 use softvt_rollout::{ChunkedPolicy, EpisodeError, FinishedEpisode, SettleError};
-use softvt_runs::record::{DemonstrationOrigin, EpisodeRecord};
+use softvt_runs::{
+    actions,
+    json_difference::json_difference,
+    manifest::RunManifest,
+    record::{DemonstrationOrigin, EpisodeRecord},
+};
 use softvt_scene::InitialStateOverride;
 use softvt_script::LoadedScript;
 
@@ -85,7 +88,7 @@ pub struct SuiteRecording<'a> {
     /// Demonstrations that each task must have: its first good attempts. `None` to keep all good attempts.
     demos: Option<u32>,
     grip_log: HoldingLog,
-    manifest: Value,
+    manifest: RunManifest,
     /// Environment arguments of the HDF5 files, in robomimic's form.
     environment: Value,
 }
@@ -141,8 +144,9 @@ impl<'a> SuiteRecording<'a> {
         let tasks = run.jobs.tasks();
         let attempts = tasks.iter().map(|task| run.jobs.episodes_of(task.id).count());
         let episodes = demos.unwrap_or(attempts.max().unwrap_or_default() as u32);
-        let manifest = json!(RunManifest::new(&run, episodes));
-        let environment = json!({ "env_name": "softvt", "type": 2, "env_kwargs": manifest });
+        let manifest = run.manifest(episodes);
+        let recorded = RunManifest { folder: None, ..manifest.clone() };
+        let environment = json!({ "env_name": "softvt", "type": 2, "env_kwargs": recorded });
         Ok(Self { options, run, tasks, folder_name, demos, grip_log, manifest, environment })
     }
 
@@ -152,8 +156,7 @@ impl<'a> SuiteRecording<'a> {
     /// The folder contains other attempts, an attempt or a file fails, or too few attempts are good.
     /// Finished attempts are kept.
     fn record(&self) -> Result<Vec<EpisodeRecord>, RunError> {
-        let (folder, records) = RunFolder::resume(&self.run.out)?;
-        let mut log = RunLog::new(&self.run, folder, records, &self.manifest)?;
+        let mut log = RunLog::open(&self.run, &self.manifest, true)?;
         let outcome = match self.run_rounds(&mut log) {
             Err(error) if log.records.is_empty() => {
                 log.discard()?;
@@ -509,7 +512,7 @@ fn check_folder(root: &Path, resume: bool, request: &Value) -> Result<bool, RunE
     if kind(&stored) != kind(request) {
         return refuse(format!("the folder contains {}; select a new folder", kind(&stored)));
     }
-    if let Some(difference) = run_manifest::difference(&stored, request) {
+    if let Some(difference) = json_difference(&stored, request) {
         return refuse(format!(
             "the folder contains another recording ({difference}); select a new folder, or use its original arguments"
         ));

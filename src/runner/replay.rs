@@ -6,8 +6,6 @@ use std::{
     sync::Arc,
 };
 
-use serde_json::{Value, json};
-
 use crate::{
     config::{ConfiguredScript, RunConfig, thread_count},
     episode_list::{EpisodeJob, EpisodeList},
@@ -15,14 +13,13 @@ use crate::{
     error::RunError,
     observer::Observer,
     policy::{ControllerFactory, PolicyConfig, PolicyOptions, PolicySource},
-    run_manifest,
     selection::{select_tasks, suites_of},
     stored_scripts::StoredScripts,
     suite_run::{PreparedRun, SuiteRun},
 };
-use softvt_benchmark::{Suite, run_changes::RunChanges, seed::SecretSeed};
+use softvt_benchmark::{Suite, seed::SecretSeed};
 use softvt_common::cancel;
-use softvt_common::episode_id::{EpisodeIndex, EpisodeSplit};
+use softvt_common::episode_id::EpisodeIndex;
 use softvt_common::parallel;
 use softvt_dataset::{
     TaskFile,
@@ -31,9 +28,11 @@ use softvt_dataset::{
 };
 use softvt_evaluation::verdict::Outcome;
 use softvt_policy::{Action, builtin::RecordedPolicy};
-use softvt_report::{actions, stored_run::StoredRun};
 use softvt_rollout::{ChunkedPolicy, FinishedEpisode, StateRecording};
-use softvt_runs::record::EpisodeRecord;
+use softvt_runs::{
+    actions, json_difference::json_difference, manifest::RunManifest, record::EpisodeRecord,
+    stored_run::StoredRun,
+};
 use softvt_script::LoadedScript;
 
 /// A controller factory that repeats the actions of a recorded episode, and its error if it ended with one.
@@ -73,16 +72,15 @@ pub(crate) fn difference(
     if serde_json::to_string(recorded)? == serde_json::to_string(simulated)? {
         return Ok(None);
     }
-    let json = |record: &EpisodeRecord| serde_json::json!(record);
-    Ok(Some(run_manifest::difference(&json(recorded), &json(simulated)).unwrap_or_default()))
+    Ok(Some(json_difference(recorded, simulated).unwrap_or_default()))
 }
 
-/// A run or dataset file, and the content of its `run.json`.
+/// A run or dataset file, and its manifest.
 pub(crate) struct StoredManifest<'a> {
     /// The file, as messages name it.
     pub path: &'a Path,
-    /// Its content.
-    pub manifest: &'a Value,
+    /// Its manifest.
+    pub manifest: &'a RunManifest,
     /// Secret of a judged run, with the file that holds it.
     pub secret: Option<&'a SecretFile>,
     /// Receiver of progress and messages.
@@ -129,7 +127,7 @@ impl StoredManifest<'_> {
         let tasks = select_tasks(&config, suite)?;
         let job = EpisodeJob { task: tasks[0], episode: index.episode };
         let run = SuiteRun {
-            split: self.split()?,
+            split: self.manifest.split,
             controllers,
             origins: record.header.origin.iter().map(|origin| (index, (**origin).clone())).collect(),
             ..SuiteRun::new(&config, &loaded, suite, EpisodeList::listed(vec![job]), PathBuf::new())?
@@ -139,29 +137,16 @@ impl StoredManifest<'_> {
         run.run_episode(job, keeps_states, &run.controllers)
     }
 
-    fn text(&self, field: &str) -> &str {
-        self.manifest[field].as_str().unwrap_or_default()
-    }
-
-    fn changes(&self) -> Result<RunChanges, RunError> {
-        RunChanges::of_manifest(self.manifest).map_err(|error| {
-            let path = self.path.display();
-            RunError::input(format!(
-                "{path}: its changes of the suite cannot be read: {error}; it is of another version"
-            ))
-        })
-    }
-
     /// The configuration of the run, for one task and with a policy whose actions come from elsewhere.
     pub(crate) fn config(&self, task: usize) -> Result<RunConfig, RunError> {
-        let changes = self.changes()?;
+        let changes = self.manifest.changes();
         let secret = self.secret(changes.seed_hash.as_deref())?.cloned();
         Ok(RunConfig {
             policy: PolicyConfig::external("replay"),
             tasks: vec![task.to_string()],
-            stored_scripts: StoredScripts::read(self.path, &self.manifest["sources"])?,
+            stored_scripts: StoredScripts::read(self.path, &self.manifest.sources)?,
             observer: self.observer.clone(),
-            ..RunConfig::of(self.text("script")).with_changes(changes, secret)
+            ..RunConfig::of(&self.manifest.script).with_changes(changes, secret)
         })
     }
 
@@ -190,24 +175,17 @@ impl StoredManifest<'_> {
         }
     }
 
-    pub(crate) fn split(&self) -> Result<EpisodeSplit, RunError> {
-        let name = self.text("split");
-        name.parse().map_err(|_| RunError::input(format!("{}: unknown split {name:?}", self.path.display())))
-    }
-
     pub(crate) fn suite<'a>(&self, loaded: &'a LoadedScript) -> Result<&'a Suite, RunError> {
-        let name = self.text("suite");
-        let suite = suites_of(&loaded.plan).iter().find(|suite| suite.name == name);
-        suite
-            .ok_or_else(|| RunError::input(format!("{} no longer has a suite {name:?}", self.text("script"))))
+        let RunManifest { script, suite: name, .. } = self.manifest;
+        let suite = suites_of(&loaded.plan).iter().find(|suite| suite.name == *name);
+        suite.ok_or_else(|| RunError::input(format!("{script} no longer has a suite {name:?}")))
     }
 
     /// Checks that scripts and thresholds are those of the stored run.
     fn check_sources(&self, run: &PreparedRun) -> Result<(), RunError> {
-        let now = json!(run.sources);
-        let before = self.manifest["sources"].as_object().into_iter().flatten();
+        let before = self.manifest.sources.iter();
         let changed: Vec<&str> = before
-            .filter(|(name, hash)| now.get(name.as_str()).is_some_and(|current| current != *hash))
+            .filter(|(name, hash)| run.sources.get(*name).is_some_and(|current| current != *hash))
             .map(|(name, _)| name.as_str())
             .collect();
         if changed.is_empty() {
@@ -233,6 +211,11 @@ pub fn recorded_config(
     let stored = StoredManifest { path: &run.dir, manifest: &run.manifest, secret, observer };
     let policy = PolicyConfig::load(&PolicyOptions::new(PolicySource::Run(run.dir.clone())))?;
     Ok(RunConfig { tasks: Vec::new(), policy, ..stored.config(0)? })
+}
+
+/// The manifest of the recording of an HDF5 file.
+pub(crate) fn recorded_manifest(file: &TaskFile) -> Result<RunManifest, RunError> {
+    Ok(RunManifest::parse(&file.path, &file.environment()?["env_kwargs"].to_string())?)
 }
 
 /// A demonstration: its file, and its number in the file.
@@ -348,13 +331,9 @@ pub(crate) fn simulate_demo_with(
     controllers: impl FnOnce(Vec<Action>) -> ControllerFactory,
 ) -> Result<EpisodeRecord, RunError> {
     let file = TaskFile::open(&demo.file)?;
-    let (record, environment) = (file.record(demo.demo)?, file.environment()?);
-    let stored = StoredManifest {
-        path: &demo.file,
-        manifest: &environment["env_kwargs"],
-        secret: None,
-        observer: observer.clone(),
-    };
+    let (record, manifest) = (file.record(demo.demo)?, recorded_manifest(&file)?);
+    let stored =
+        StoredManifest { path: &demo.file, manifest: &manifest, secret: None, observer: observer.clone() };
     Ok(stored.simulate_with(&record, controllers(file.actions(demo.demo)?), false)?.record)
 }
 

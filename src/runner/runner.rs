@@ -7,7 +7,7 @@ use std::{
 };
 
 use crate::{
-    config::{ConfiguredScript, RunConfig, Shard, TraceDetail},
+    config::{ConfiguredScript, RunConfig, TraceDetail},
     episode_artifacts::EpisodeFilter,
     error::RunError,
     evaluate::{SuiteResult, run_episodes, run_suite},
@@ -17,7 +17,7 @@ use crate::{
     suite_run::SuiteRun,
 };
 use softvt_benchmark::{Plan, ShiftValue};
-use softvt_runs::record::EpisodeRecord;
+use softvt_runs::{record::EpisodeRecord, shard::Shard};
 use softvt_script::LoadedScript;
 
 /// Runs the suites of a loaded script. Without an output folder, nothing is written.

@@ -11,7 +11,7 @@ use crate::{
 };
 use softvt_benchmark::{Plan, Suite, Task};
 use softvt_common::episode_id::EpisodeSplit;
-use softvt_report::run_folder::RunFolder;
+use softvt_runs::run_folder::RunFolder;
 
 /// The suites of a plan that is a suite or a list of suites; empty for other plans.
 pub fn suites_of(plan: &Plan) -> &[Suite] {

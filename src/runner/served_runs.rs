@@ -10,13 +10,11 @@ use crate::{
     config::RunConfig,
     error::RunError,
     evaluate::{RunLog, episode_line, restore_artifacts, with_kept},
-    run_manifest::RunManifest,
     suite_run::PreparedRun,
 };
 use softvt_common::cancel::{self, CancelFlag};
 use softvt_common::episode_id::{EpisodeId, EpisodeIndex};
 use softvt_common::{parallel::lock, text::counted};
-use softvt_report::run_folder::RunFolder;
 use softvt_rollout::FinishedEpisode;
 use softvt_runs::summary::SuiteSummary;
 use softvt_serve::{EpisodeRecorder, RequestError};
@@ -88,7 +86,7 @@ impl<'a> ServedRuns<'a> {
     fn begin(&self, id: &EpisodeId) -> Result<(), RequestError> {
         let attempts = self.find(&id.suite).and_then(|served| lock(&served.log).attempts.clone());
         let begun = attempts.map_or(Ok(()), |attempts| attempts.begin(id.index()));
-        begun.map_err(|error| self.fail(error))
+        begun.map_err(|error| self.fail(error.into()))
     }
 
     /// Ends the server after an error.
@@ -146,13 +144,8 @@ impl<'a> ServedRuns<'a> {
 impl<'a> ServedRun<'a> {
     fn open(run: &'a PreparedRun<'a>) -> Result<Self, RunError> {
         let config = run.config;
-        let manifest = RunManifest::new(run, config.episodes_of(run.suite));
-        let opened = match config.resume {
-            true => RunFolder::resume(&run.out),
-            false => RunFolder::create(&run.out).map(|folder| (folder, Vec::new())),
-        };
-        let (folder, records) = opened.map_err(|error| config.error(error))?;
-        let mut log = RunLog::new(run, folder, records, &manifest)?;
+        let manifest = run.manifest(config.episodes_of(run.suite));
+        let mut log = RunLog::open(run, &manifest, config.resume)?;
         restore_artifacts(run, &log.records)?;
         let resumed = log.records.iter().map(|record| record.header.id.index()).collect();
         write_if_complete(run, &mut log)?;

@@ -14,6 +14,7 @@ use crate::{
 use softvt_benchmark::{Plan, Suite};
 use softvt_common::{
     cancel::CancelFlag,
+    digest::sha256_hex,
     episode_id::{EpisodeId, EpisodeSplit},
 };
 use softvt_policy::Observation;
@@ -159,5 +160,5 @@ fn served_suite(run: &PreparedRun) -> Suite {
 /// Hash of all that determines an episode, except its index and the actions of the client.
 fn provenance_hash(config: &RunConfig, loaded: &LoadedScript) -> String {
     let all = json!([env!("CARGO_PKG_VERSION"), loaded.file_hashes(), config.changes().hash()]);
-    softvt_script::sha256(all.to_string().as_bytes())
+    sha256_hex(all.to_string())
 }

@@ -6,12 +6,15 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use serde_json::Value;
-
-use crate::{error::RunError, observer::Observer, replay::demos_of};
-use softvt_common::files::{self, FileError};
+use crate::{
+    error::RunError,
+    observer::Observer,
+    replay::{demos_of, recorded_manifest},
+};
+use softvt_common::files::FileError;
 use softvt_dataset::{TaskFile, layout::ATTEMPTS};
-use softvt_report::{
+use softvt_runs::{
+    manifest::RunManifest,
     run_folder::{RUN, SCRIPTS},
     stored_run::StoredRun,
 };
@@ -23,10 +26,10 @@ use softvt_report::{
 /// # Errors
 /// The script is in none of the folders.
 pub fn enter_for_run(run: &StoredRun, observer: &dyn Observer) -> Result<PathBuf, RunError> {
-    if run.dir.join(SCRIPTS).is_file() && run.manifest["vary"].is_null() {
+    if run.dir.join(SCRIPTS).is_file() && run.manifest.vary.is_none() {
         return Ok(run.dir.clone());
     }
-    enter(&run.dir, run.text("script"), run.manifest["folder"].as_str(), observer)
+    enter(&run.dir, &run.manifest.script, run.manifest.folder.as_deref(), observer)
 }
 
 /// Makes the folder of a recording the working folder, unless its script is in the present one. Returns the path of the
@@ -36,9 +39,9 @@ pub fn enter_for_run(run: &StoredRun, observer: &dyn Observer) -> Result<PathBuf
 /// The dataset cannot be read, or the script is in none of the folders.
 pub fn enter_for_dataset(path: &Path, observer: &dyn Observer) -> Result<PathBuf, RunError> {
     let Some(demo) = demos_of(path)?.into_iter().next() else { return Ok(path.to_owned()) };
-    let environment = TaskFile::open(&demo.file)?.environment()?;
+    let manifest = recorded_manifest(&TaskFile::open(&demo.file)?)?;
     let folder = recording_folder(&demo.file)?;
-    enter(path, environment["env_kwargs"]["script"].as_str().unwrap_or_default(), folder.as_deref(), observer)
+    enter(path, &manifest.script, folder.as_deref(), observer)
 }
 
 /// The folder in which the recording of an HDF5 file was made, as its attempts state it.
@@ -46,12 +49,9 @@ fn recording_folder(file: &Path) -> Result<Option<String>, RunError> {
     let file = std::path::absolute(file).map_err(FileError::io("locate", file))?;
     let attempts = file.ancestors().map(|folder| folder.join(ATTEMPTS)).find(|folder| folder.is_dir());
     let suites = attempts.and_then(|attempts| fs::read_dir(attempts).ok());
-    let mut manifests: Vec<PathBuf> =
-        suites.into_iter().flatten().filter_map(Result::ok).map(|suite| suite.path().join(RUN)).collect();
-    manifests.sort();
-    let Some(manifest) = manifests.into_iter().find(|path| path.is_file()) else { return Ok(None) };
-    let manifest: Value = serde_json::from_str(&files::read_text(&manifest)?)?;
-    Ok(manifest["folder"].as_str().map(str::to_owned))
+    let runs = suites.into_iter().flatten().filter_map(Result::ok).map(|suite| suite.path());
+    let Some(first) = runs.filter(|run| run.join(RUN).is_file()).min() else { return Ok(None) };
+    Ok(RunManifest::read(&first)?.folder)
 }
 
 /// Makes the folder that has `script` the working folder: the present one, `stored`, or one above `path`. Returns

@@ -11,10 +11,12 @@ use std::{
 };
 
 use serde::{Deserialize, Serialize};
-use serde_json::Value;
-use softvt_common::files::{self, FileError};
-use softvt_report::run_folder::{RUN, SCRIPTS};
-use softvt_script::{LoadedScript, ScriptFiles, sha256};
+use softvt_common::{
+    digest::sha256_hex,
+    files::{self, FileError},
+};
+use softvt_runs::run_folder::{RUN, SCRIPTS};
+use softvt_script::{LoadedScript, ScriptFiles};
 use zip::{CompressionMethod, ZipArchive, ZipWriter, write::SimpleFileOptions};
 
 use crate::error::RunError;
@@ -124,7 +126,10 @@ impl StoredScripts {
     ///
     /// # Errors
     /// It is damaged or too large, or its files are not those of `run.json`.
-    pub(crate) fn read(folder: &Path, sources: &Value) -> Result<Option<Arc<Self>>, RunError> {
+    pub(crate) fn read(
+        folder: &Path,
+        sources: &BTreeMap<String, String>,
+    ) -> Result<Option<Arc<Self>>, RunError> {
         let path = folder.join(SCRIPTS);
         if !path.is_file() {
             return Ok(None);
@@ -146,7 +151,7 @@ impl StoredScripts {
             let index: Index = serde_json::from_slice(&entry(INDEX, MAX_INDEX_BYTES)?)?;
             let mut file = |name: &str, of: &str| -> Result<Vec<u8>, Box<dyn Error>> {
                 let bytes = entry(of, MAX_BYTES)?;
-                match sources[name] == sha256(&bytes) {
+                match sources.get(name) == Some(&sha256_hex(&bytes)) {
                     true => Ok(bytes),
                     false => Err(format!("{name} in it is not that of {RUN}").into()),
                 }
@@ -164,7 +169,7 @@ impl StoredScripts {
             }
             let mut calibrations = BTreeMap::new();
             // Those of scenes that are no episodes of the run are not listed, and not used.
-            for (name, of) in index.calibrations.into_iter().filter(|(name, _)| !sources[name].is_null()) {
+            for (name, of) in index.calibrations.into_iter().filter(|(name, _)| sources.contains_key(name)) {
                 let text = String::from_utf8(file(&name, &of)?)?;
                 calibrations.insert(name, text);
             }
@@ -203,8 +208,8 @@ mod tests {
         };
         let calibrations = [("assets/calibration/bun.json".to_owned(), "{}".to_owned())].into();
         let stored = StoredScripts { main: "/home/me/a.lua".to_owned(), scripts, calibrations };
-        let mut sources = json!(stored.scripts.hashes());
-        sources["assets/calibration/bun.json"] = sha256(b"{}").into();
+        let mut sources = stored.scripts.hashes();
+        sources.insert("assets/calibration/bun.json".to_owned(), sha256_hex("{}"));
         let folder = tempfile::tempdir().unwrap();
         assert_eq!(StoredScripts::read(folder.path(), &sources).unwrap(), None);
         stored.write(folder.path()).unwrap();
@@ -212,7 +217,7 @@ mod tests {
         assert_eq!(stored.archive().unwrap(), stored.archive().unwrap());
         for name in ["b/a.lua", "assets/calibration/bun.json"] {
             let mut others = sources.clone();
-            others[name] = sha256(b"easier").into();
+            others.insert(name.to_owned(), sha256_hex("easier"));
             let error = StoredScripts::read(folder.path(), &others).unwrap_err().to_string();
             assert!(error.contains(&format!("{name} in it is not that of run.json")), "{error}");
         }
@@ -224,9 +229,9 @@ mod tests {
     #[test]
     fn an_archive_of_many_large_files_is_refused_before_it_fills_the_memory() {
         let large = vec![0; 60 << 20];
-        let (hash, names) = (sha256(&large), (0..3000).map(|number| number.to_string()));
+        let (hash, names) = (sha256_hex(&large), (0..3000).map(|number| number.to_string()));
         let files: BTreeMap<String, &str> = names.map(|name| (name, "entry")).collect();
-        let sources: BTreeMap<&String, &String> = files.keys().map(|name| (name, &hash)).collect();
+        let sources = files.keys().map(|name| (name.clone(), hash.clone())).collect();
         let index = json!({
             "main": "0", "files": files, "served": {}, "absent": [], "refused": {}, "hidden": [], "calibrations": {},
         });
@@ -237,7 +242,7 @@ mod tests {
             zip.write_all(content).unwrap();
         }
         zip.finish().unwrap();
-        let error = StoredScripts::read(folder.path(), &json!(sources)).unwrap_err().to_string();
+        let error = StoredScripts::read(folder.path(), &sources).unwrap_err().to_string();
         assert!(error.contains("larger than 256 MiB together"), "{error}");
     }
 }

@@ -15,20 +15,22 @@ use crate::{
     friction::friction_warnings,
     limits::{CalibrationFiles, Calibrations, LimitScan, SceneLimits},
     policy::{ControllerFactory, DeclaredStreams, PolicyConfig},
-    recorded_runs::{RecordedRuns, ReplaySource},
+    recorded_runs::RecordedRuns,
     selection::{select_episodes, select_tasks},
 };
 use softvt_benchmark::{ObjectType, ShiftValue, Suite, Task, settings::Settings};
 use softvt_common::cancel;
 use softvt_common::episode_id::{EpisodeId, EpisodeIndex, EpisodeSplit};
 use softvt_common::{parallel, text::unknown_name};
-use softvt_dataset::card::ImportedFile;
 use softvt_policy::{EpisodeBrief, PolicyError, SensorStreams, remote::PolicyConnections};
 use softvt_rollout::{
     AssetCache, Episode, EpisodeError, EpisodeSpec, FinishedEpisode, SceneBuildError, SensorAssets, Sensors,
     Simulation, StatePredicate, check_goal, check_sensors, cost_warning,
 };
-use softvt_runs::record::{DemonstrationOrigin, PRIVILEGED_POLICIES};
+use softvt_runs::{
+    manifest::{ImportedFile, ReplaySource},
+    record::{DemonstrationOrigin, PRIVILEGED_POLICIES},
+};
 use softvt_scene::{Body, Object, Scene};
 use softvt_script::{EpisodeSetup, LoadedScript, SceneBuilder, SceneChanges};
 

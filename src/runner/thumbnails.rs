@@ -10,9 +10,9 @@ use crate::{
     replay::StoredManifest,
     suite_run::SuiteRun,
 };
-use softvt_report::{page::Thumbnails, stored_run::StoredRun};
+use softvt_report::page::Thumbnails;
 use softvt_rollout::{Sensors, Simulation};
-use softvt_runs::record::EpisodeRecord;
+use softvt_runs::{record::EpisodeRecord, stored_run::StoredRun};
 
 /// Edge of a picture, pixels.
 const EDGE: usize = 128;
@@ -56,7 +56,7 @@ fn of_run(
         suite,
         EpisodeList::listed(Vec::new()),
         PathBuf::new(),
-        stored.split()?,
+        run.manifest.split,
     )?;
     let mut pictures = Thumbnails::new();
     for (asset, record) in episodes {

@@ -29,7 +29,7 @@ pub use run::{
 pub use vm::{
     PrintSink, VmLimits,
     error::ScriptError,
-    library::{ScriptFiles, embedded, embedded_scripts, sha256},
+    library::{ScriptFiles, embedded, embedded_scripts},
     set_stuck_handler,
     watchdog::StuckHandler,
 };

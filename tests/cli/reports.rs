@@ -43,7 +43,7 @@ fn warnings_of_reports_are_printed_and_damaged_runs_refused() {
         ["report runs/a --out no", "compare runs/b runs/a", "merge no runs/a runs/b", "replay runs/a 0/0"];
     for reader in readers {
         let message = project.refusal(reader);
-        let problem = "goal is true, and the outcome is not completed";
+        let problem = "its SHA-256 is not the record_sha256 at its end";
         assert!(message.contains("runs/a/episodes.jsonl:1: ") && message.contains(problem), "{message}");
     }
     for (dir, words) in [("nowhere", "folder nowhere does not exist"), ("x.lua", "x.lua is a file")] {

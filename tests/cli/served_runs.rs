@@ -3,7 +3,7 @@
 
 use std::fs;
 
-use softvt::{episode_id::EpisodeIndex, policy::Action, report::actions};
+use softvt::{episode_id::EpisodeIndex, policy::Action, runs::actions};
 
 use crate::{
     serve::Server,

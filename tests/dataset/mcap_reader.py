@@ -12,6 +12,7 @@ from PIL import Image
 
 path, records = sys.argv[1:]
 record = json.loads(open(records).readline())
+del record["record_sha256"]  # of the line
 steps = record["steps"]
 with open(path, "rb") as file:
     reader = make_reader(file, decoder_factories=[DecoderFactory()], validate_crcs=True)

@@ -279,7 +279,7 @@ fn the_teacher_of_a_suite_demonstrates_unless_a_policy_is_given() {
     for (given, policy) in [(None, "tactile-servo"), (Some(Teacher::Expert.into()), "expert")] {
         Recording { policy: given, ..record(policy) }.record();
         let attempts = project.stored(&format!("{policy}/attempts")).expect("a run");
-        assert_eq!(attempts[0].text("policy"), policy);
+        assert_eq!(attempts[0].manifest.policy, policy);
     }
     // An evaluation is not taught.
     assert_eq!(project.run("x.lua").record().header.policy, "expert");

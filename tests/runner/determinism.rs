@@ -51,7 +51,7 @@ fn selected_episodes_are_those_of_a_whole_run() {
     assert_eq!(records, [whole[1].clone(), whole[3].clone()]);
     assert!(!project.stored("some").expect("a run")[0].is_partial());
     let other = selected(&[1]).out("some").resume().error();
-    assert!(other.contains("task 0 episode 3 belongs to another run"), "{other}");
+    assert!(other.contains("belongs to another run: episodes: 2 before, 1 now"), "{other}");
     let video = |config: &mut RunConfig| config.video = Some(EpisodeFilter::Episodes(vec![0]));
     let video = selected(&[1]).out("other").with(video).error();
     assert!(video.contains("runs only episode 1 of each task"), "{video}");

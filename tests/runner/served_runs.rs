@@ -6,8 +6,8 @@ use rmpv::Value;
 use softvt::{
     episode_id::{EpisodeIndex, EpisodeSplit},
     policy::{Action, profile::GripCode},
-    report::{actions, comparison, styled_text::TerminalFormat, terminal},
-    runs::summary::SuiteSummary,
+    report::{comparison, styled_text::TerminalFormat, terminal},
+    runs::{actions, summary::SuiteSummary},
 };
 
 use crate::{
@@ -57,8 +57,14 @@ fn run_episode(project: &Project, client: &mut Client, episode: u32) -> bool {
 
 /// A file of a run without the name of its policy and the mark of recorded actions.
 fn without_policy(project: &Project, path: &str, policy: &str) -> String {
+    let digest = |line: &str| {
+        line.split_once(",\"record_sha256\"").map_or(line, |(record, _)| record).to_owned() + "\n"
+    };
     project
         .text(path)
+        .lines()
+        .map(digest)
+        .collect::<String>()
         .replace(&format!("\"policy\":\"{policy}\""), "")
         .replace(&format!("\"policy\": \"{policy}\""), "")
         .replace("\"replayed\":true,", "")

@@ -17,8 +17,6 @@ use softvt::{
         condition_table::ConditionTable,
         page,
         run_summary::{summarize_runs, warnings},
-        shard_merge,
-        stored_run::{self, StoredRun},
         tables::{ResultTable, all_tables},
     },
     runner::{
@@ -29,7 +27,11 @@ use softvt::{
         replay::{self, SecretFile},
         selection::check_distinct_out_dirs,
     },
-    runs::record::EpisodeRecord,
+    runs::{
+        record::EpisodeRecord,
+        shard_merge,
+        stored_run::{self, StoredRun},
+    },
     script::{ExperimentInput, ExperimentRow},
 };
 

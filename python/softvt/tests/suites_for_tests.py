@@ -89,6 +89,7 @@ def expert_run(policy: str = "expert", suite: str = "suites/object_soft.lua") ->
     command = [softvt.find_binary(), suite, "--task", "0", "--episodes", "1", "--policy", policy, "--out", str(out)]
     subprocess.run(command, check=True, capture_output=True)
     record = json.loads((out / "episodes.jsonl").read_text())
+    del record["record_sha256"]  # of the line
     return np.load(out / "actions/task_000/episode_00000.npy"), record
 
 

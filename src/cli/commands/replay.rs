@@ -11,7 +11,7 @@ use crate::{
 };
 use softvt_common::cancel;
 use softvt_dataset::layout::is_dataset;
-use softvt_report::{mcap::write_mcap, stored_run::StoredRun};
+use softvt_report::mcap::write_mcap;
 use softvt_runner::{
     Observer,
     episode_selector::EpisodeSelector,
@@ -20,6 +20,7 @@ use softvt_runner::{
     stored_folder::{enter_for_dataset, enter_for_run},
     thread_count,
 };
+use softvt_runs::stored_run::StoredRun;
 
 /// Simulate a recorded episode again; exit code 0 if the result is byte-identical
 #[derive(Args, Debug)]

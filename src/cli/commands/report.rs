@@ -14,9 +14,10 @@ use softvt_report::{
     policy_ranking::PolicyRanking,
     report_files,
     run_summary::{summarize_runs, warnings},
-    shard_merge, stored_run, terminal,
+    terminal,
 };
 use softvt_runner::{Observer, thumbnails};
+use softvt_runs::{shard_merge, stored_run};
 
 /// Write an HTML page about runs, its tables as Markdown and LaTeX, and a JSON row per run
 #[derive(Args, Debug)]

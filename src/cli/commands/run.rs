@@ -14,7 +14,6 @@ use softvt_policy::profile::Profile;
 use softvt_report::{
     commands::next_commands,
     condition_table::{ConditionTable, compares_policies, controllers_table, table},
-    stored_run,
     styled_text::TerminalFormat,
     terminal,
 };
@@ -24,7 +23,7 @@ use softvt_runner::{
     plan_noun,
     selection::{check_distinct_out_dirs, check_parent_folder, next_run_dir},
 };
-use softvt_runs::{requirement::Requirement, summary::SuiteSummary};
+use softvt_runs::{requirement::Requirement, stored_run, summary::SuiteSummary};
 use softvt_script::ExperimentRow;
 
 /// A safety-aware visuo-tactile manipulation benchmark for soft objects, on an ordinary CPU

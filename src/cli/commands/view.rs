@@ -18,7 +18,6 @@ use softvt_common::{
 use softvt_report::{
     episode_page::{self, DeformationTimes, PolicyPart},
     mcap::write_mcap,
-    run_folder::RunFolder,
     video::{
         VideoCaption,
         side_by_side::{self, PolicyEpisode},
@@ -30,7 +29,7 @@ use softvt_runner::{
     ConfiguredScript, EpisodeJob, EpisodeList, PreparedRun, RunConfig, RunError, SuiteRun,
     selection::path_component,
 };
-use softvt_runs::record::EpisodeRecord;
+use softvt_runs::{record::EpisodeRecord, run_folder::RunFolder};
 
 /// Render one episode: a video, and stills of every camera and tactile sensor
 #[derive(Args, Clone, Debug)]

@@ -14,11 +14,11 @@ use crate::{
     output::{Console, print},
 };
 use softvt_common::{episode_id::EpisodeSplit, text::hex};
-use softvt_report::stored_run::StoredRun;
 use softvt_runner::{
     ConfiguredScript, Observer, RunConfig, replay::recorded_config, selection::suites_of,
     stored_folder::enter_for_run,
 };
+use softvt_runs::stored_run::StoredRun;
 use softvt_watch::{Program, Selection, Watch};
 
 /// Show episodes on a local web page, while they are simulated and afterwards
@@ -117,11 +117,9 @@ fn recorded_program(args: &WatchArgs) -> Result<Program, CliError> {
         };
         return Err(CliError::input(message).prefixed(dir.display()));
     }
-    let suite = stored.text("suite").to_owned();
+    let suite = stored.manifest.suite.clone();
     let selection = Selection { suite, task, episode: args.episode, ..Selection::default() };
-    let split =
-        stored.text("split").parse().map_err(|error| CliError::input(error).prefixed(dir.display()))?;
-    Ok(Program { config, selection, split })
+    Ok(Program { config, selection, split: stored.manifest.split })
 }
 
 /// A random token of 128 bits.

@@ -31,7 +31,7 @@ fn results(runs: &[&RunSummary]) -> Markup {
     let (low, high) =
         goals.iter().fold((100.0_f64, 0.0_f64), |(low, high), goal| (low.min(*goal), high.max(*goal)));
     let who = match valid[..] {
-        [single] => single.run.text("policy").to_owned(),
+        [single] => single.run.manifest.policy.clone(),
         [_, _] => "Both policies".to_owned(),
         _ => format!("All {} policies", valid.len()),
     };
@@ -48,7 +48,7 @@ fn results(runs: &[&RunSummary]) -> Markup {
         @else { "Goal Success is " (format!("{low:.0}")) " to " (format!("{high:.0}")) " %. " }
         @for run in &over { b.over { (over_limit(run)) } " " }
         @if is_soft && within.len() == valid.len() { b.safe { "No object is over its limit." } }
-        @else if let (true, [single]) = (is_soft, &within[..]) { b.safe { (single.run.text("policy")) } " stays within the limit." }
+        @else if let (true, [single]) = (is_soft, &within[..]) { b.safe { (single.run.manifest.policy) } " stays within the limit." }
         @else if is_soft && !within.is_empty() {
             b.safe { @if within.len() + over.len() == valid.len() { "The other " } (within.len()) " policies" } " stay within the limit."
         }
@@ -65,7 +65,7 @@ fn is_within(run: &RunSummary) -> bool {
 fn dropped(run: &RunSummary) -> Option<String> {
     let drops = run.run.records.iter().filter(|record| !record.verdict.no_drop).count();
     let all = run.run.records.len();
-    (drops > 0).then(|| format!("{} drops {drops} of {all}.", run.run.text("policy")))
+    (drops > 0).then(|| format!("{} drops {drops} of {all}.", run.run.manifest.policy))
 }
 
 /// "expert-binary crushes the object in 10 of 10 episodes (67 % of the volume collapsed)."
@@ -73,7 +73,7 @@ fn over_limit(run: &RunSummary) -> String {
     let over: Vec<_> =
         run.run.records.iter().filter(|record| record.category() == EpisodeCategory::OverLimit).collect();
     let crushed = over.iter().filter(|record| record.crushed_volume_pct().is_some()).count();
-    let (policy, all) = (run.run.text("policy"), run.run.records.len());
+    let (policy, all) = (&run.run.manifest.policy, run.run.records.len());
     let volumes: Vec<f64> = over.iter().filter_map(|record| record.collapsed_volume_pct()).collect();
     let mean = volumes.iter().sum::<f64>() / volumes.len().max(1) as f64;
     // Harm in episodes that another category names.

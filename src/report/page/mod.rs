@@ -18,15 +18,16 @@ use std::{
 
 use image::RgbImage;
 use maud::{DOCTYPE, Markup, PreEscaped, html};
-use serde_json::Value;
 
-use softvt_benchmark::run_changes::RunChanges;
 use softvt_common::text::{counted, escape_control};
+use softvt_runs::{
+    manifest::RunManifest,
+    run_folder::{RUN, SUMMARY},
+};
 
 use super::{
     condition_effects::{ConditionEffects, condition_effects, effects_table},
     report_files::MARKDOWN,
-    run_folder::{RUN, SUMMARY},
     run_summary::{RunSummary, warnings},
     tables::{
         ResultTable, TEXT_COLUMNS, bootstrap_table, command_table, crushed_table, deformation_table,
@@ -42,7 +43,7 @@ pub fn page(runs: &[RunSummary], thumbnails: &Thumbnails, out: &Path) -> String 
     let episodes: usize = runs.iter().map(|run| run.run.records.len()).sum();
     let title = format!("softvt: {}", suites(runs).join(", "));
     let effects = condition_effects(runs);
-    let seeds: BTreeSet<String> = runs.iter().map(|run| seed_text(&run.run.changes())).collect();
+    let seeds: BTreeSet<String> = runs.iter().map(|run| seed_text(&run.run.manifest)).collect();
     let seeds = seeds.into_iter().collect::<Vec<_>>().join(", ");
     let is_soft = runs.iter().any(RunSummary::is_soft);
     let markup = html! {
@@ -238,17 +239,26 @@ fn cell(text: &str, is_text: bool) -> Markup {
 /// The main fields of `run.json`, and links to the files of the run.
 fn settings(summary: &RunSummary, out: &Path) -> Markup {
     let manifest = &summary.run.manifest;
+    let RunManifest { script, arguments, shifts, set, options, thresholds, .. } = manifest;
+    let command_line: Vec<&str> = [script].into_iter().chain(arguments).map(String::as_str).collect();
+    let shifts = shifts.iter().map(|shift| format!("{}={}", shift.name, number(shift.value)));
+    let set = set.iter().map(|(path, value)| format!("{path}={value}"));
+    let options = options.iter().map(|(name, value)| format!("{name} {value}"));
+    let thresholds = thresholds.iter().map(|(asset, tau)| match tau {
+        Some(tau) => format!("{asset} {} %", number(*tau)),
+        None => format!("{asset} none"),
+    });
     let fields = [
         ("Folder", summary.run.dir.display().to_string()),
-        ("Script", command_line(&manifest["script"], &manifest["arguments"])),
+        ("Script", command_line.join(" ")),
         ("Policy", summary.summary.method_label()),
-        ("softvt", value_text(&manifest["softvt"])),
-        ("Seed, split", format!("{}, {}", seed_text(&summary.run.changes()), value_text(&manifest["split"]))),
-        ("Episodes", format!("{} of {}", summary.run.records.len(), summary.run.requested_episodes())),
-        ("Shifts", pairs(&manifest["shifts"])),
-        ("Settings changed", pairs(&manifest["set"])),
-        ("Options", entries(&manifest["options"], "")),
-        ("Thresholds τ", entries(&manifest["thresholds"], " %")),
+        ("softvt", manifest.softvt.clone()),
+        ("Seed, split", format!("{}, {}", seed_text(manifest), manifest.split.name())),
+        ("Episodes", format!("{} of {}", summary.run.records.len(), manifest.requested_episodes())),
+        ("Shifts", list(shifts)),
+        ("Settings changed", list(set)),
+        ("Options", list(options)),
+        ("Thresholds τ", list(thresholds)),
     ];
     html! {
         details {
@@ -264,41 +274,20 @@ fn settings(summary: &RunSummary, out: &Path) -> Markup {
 }
 
 /// The seed of a run. That of a judged run is secret; its hash identifies it.
-fn seed_text(RunChanges { seed, seed_hash, .. }: &RunChanges) -> String {
+fn seed_text(RunManifest { seed, seed_hash, .. }: &RunManifest) -> String {
     seed_hash.as_ref().map_or_else(|| seed.to_string(), |hash| format!("secret, SHA-256 {hash}"))
 }
 
-fn value_text(value: &Value) -> String {
-    match value {
-        Value::Null => "none".to_owned(),
-        Value::String(text) => text.clone(),
-        Value::Number(number) => number
-            .as_f64()
-            .filter(|x| x.fract() != 0.0)
-            .map_or_else(|| number.to_string(), |x| format!("{:.3}", x).trim_end_matches('0').to_owned()),
-        other => other.to_string(),
+/// A number with at most three decimals.
+fn number(x: f64) -> String {
+    match x.fract() {
+        0.0 => format!("{x:?}"),
+        _ => format!("{x:.3}").trim_end_matches('0').to_owned(),
     }
 }
 
-fn command_line(script: &Value, arguments: &Value) -> String {
-    let all = [script].into_iter().chain(arguments.as_array().into_iter().flatten());
-    all.map(value_text).collect::<Vec<_>>().join(" ")
-}
-
-fn pairs(list: &Value) -> String {
-    let all = list.as_array().into_iter().flatten();
-    all.map(|pair| format!("{}={}", value_text(&pair[0]), value_text(&pair[1])))
-        .collect::<Vec<_>>()
-        .join(", ")
-}
-
-fn entries(object: &Value, unit: &str) -> String {
-    let all = object.as_object().into_iter().flatten();
-    let shown = |(name, value): (&String, &Value)| match value {
-        Value::Null => format!("{name} none"),
-        value => format!("{name} {}{unit}", value_text(value)),
-    };
-    all.map(shown).collect::<Vec<_>>().join(", ")
+fn list(items: impl Iterator<Item = String>) -> String {
+    items.collect::<Vec<_>>().join(", ")
 }
 
 #[cfg(test)]

@@ -57,9 +57,9 @@ struct BlindBound {
 
 /// The bound of a suite whose runs include such controllers.
 fn blind_bound(runs: &[RunSummary]) -> Option<BlindBound> {
-    let bounds = runs.iter().filter(|run| run.is_soft() && run.run.is_blind_bound()).filter_map(|run| {
+    let bounds = runs.iter().filter(|run| run.is_soft() && run.run.manifest.blind).filter_map(|run| {
         let safety = run.summary.scores.safety_success_rate.rate?;
-        Some(BlindBound { policy: run.run.text("policy").to_owned(), safety })
+        Some(BlindBound { policy: run.run.manifest.policy.clone(), safety })
     });
     bounds.reduce(|a, b| if b.safety > a.safety { b } else { a })
 }
@@ -92,7 +92,7 @@ fn row(run: &RunSummary, bound: Option<&BlindBound>) -> Markup {
     let count = run.run.records.len();
     html! {
         tr {
-            th.text scope="row" { (breakable(&run.method)) @if run.run.is_blind_bound() { span.interval { "one constant number" } } }
+            th.text scope="row" { (breakable(&run.method)) @if run.run.manifest.blind { span.interval { "one constant number" } } }
             td.text.chart data-head="Goal → Safety" { (dumbbell(goal, safety, scores.count(EpisodeCategory::OverLimit) > 0, bound)) }
             td.number data-head="Goal, %" { (rate(goal)) }
             td.number data-head="Safety, %" { @match safety { Some(safety) => b { (rate(safety)) }, None => "N/A" } }
@@ -102,7 +102,7 @@ fn row(run: &RunSummary, bound: Option<&BlindBound>) -> Markup {
             td.text data-head="Episodes" {
                 (outcome_bar(run))
                 span.counts {
-                    @if run.run.is_partial() { (count) " of " (run.run.requested_episodes()) ": " }
+                    @if run.run.is_partial() { (count) " of " (run.run.manifest.requested_episodes()) ": " }
                     @for category in EpisodeCategory::ALL {
                         @if scores.count(category) > 0 { span.nobreak { (category.glyph()) " " (scores.count(category)) } " " }
                     }

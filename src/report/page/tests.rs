@@ -1,16 +1,15 @@
 use crate::sample_record;
 use std::{collections::BTreeMap, fs};
 
-use serde_json::json;
-
 use super::*;
-use crate::{
-    run_summary::{summarize_runs, tests::stored},
-    stored_run::StoredRun,
+use crate::run_summary::{
+    summarize_runs,
+    tests::{shift, stored},
 };
 use softvt_evaluation::verdict::TargetVerdict;
 use softvt_media::palette::{Colour, DROPPED, FAINT, OVER_LIMIT, SAFE};
-use softvt_runs::record::EpisodeRecord;
+use softvt_policy::profile::Profile;
+use softvt_runs::{record::EpisodeRecord, stored_run::StoredRun};
 
 const HOSTILE: &str = "<script>alert('x')</script>\"&lt; | \\input{x}";
 
@@ -62,8 +61,8 @@ fn hostile_names_are_escaped() {
         record.stats.gave_up = Some(HOSTILE.into());
     }
     let mut run = stored("/nowhere/it's <b>", HOSTILE, records);
-    run.manifest["arguments"] = json!([format!("--name={HOSTILE}")]);
-    run.manifest["shifts"] = json!([[HOSTILE, 2]]);
+    run.manifest.arguments.push(format!("--name={HOSTILE}"));
+    run.manifest.shifts.push(shift(HOSTILE, 2.0));
     let page = render(vec![run]);
     assert_well_formed(&page);
     assert!(!page.contains("<script") && !page.contains("<b>\""));
@@ -79,7 +78,7 @@ fn control_characters_of_names_are_escaped() {
         (record.header.prompt, record.header.asset) = (hostile.into(), hostile.into());
     }
     let mut run = stored("/nowhere/\u{1b}[31mrun", "noop", records);
-    run.manifest["arguments"] = json!([format!("--asset={hostile}")]);
+    run.manifest.arguments.push(format!("--asset={hostile}"));
     let page = render(vec![run]);
     assert_well_formed(&page);
     assert!(!page.contains(|c: char| c.is_control() && c != '\n' && c != '\t'));
@@ -119,7 +118,7 @@ fn the_page_is_self_contained_and_accessible() {
 #[test]
 fn constant_numbers_and_pictures_of_objects_are_shown() {
     let mut blind = stored("a", "drives", episodes("soft", 4));
-    blind.manifest["blind"] = json!(true);
+    blind.manifest.blind = true;
     let runs = summarize_runs(vec![blind, stored("b", "pi", episodes("soft", 9))]);
     let asset = runs[0].run.records[0].header.asset.clone();
     let picture = RgbImage::from_pixel(128, 128, image::Rgb([9, 80, 200]));
@@ -138,18 +137,15 @@ fn constant_numbers_and_pictures_of_objects_are_shown() {
 #[test]
 fn an_episode_of_a_policy_server_or_a_client_is_viewed_by_its_actions() {
     let mut run = stored("runs/mine", "client", episodes("soft", 4));
-    run.manifest["profile"] = json!({ "name": "vision" });
-    let remote = render(vec![run.clone()]);
-    assert!(remote.contains("--policy runs/mine"), "a policy server");
-    run.manifest["served"] = json!(true);
+    run.manifest.profile = Profile::named("vision");
     let page = render(vec![run]);
     assert!(page.contains("--episode 1 --policy runs/mine --seed 11"), "{page}");
 }
 
 /// A run of 20 episodes under a shift, every second of which is unsafe.
-fn shifted(dir: &str, shift: Option<(&str, f64)>) -> StoredRun {
+fn shifted(dir: &str, change: Option<(&str, f64)>) -> StoredRun {
     let mut run = stored(dir, "pi", episodes("soft", 20));
-    run.manifest["shifts"] = json!(shift.into_iter().collect::<Vec<_>>());
+    run.manifest.shifts.extend(change.map(|(name, value)| shift(name, value)));
     run
 }
 
@@ -227,7 +223,7 @@ fn pages_of_forty_runs_and_of_none_are_valid() {
 #[test]
 fn a_run_in_progress_or_of_another_version_is_reported() {
     let mut run = stored("runs/a", "noop", episodes("soft", 3));
-    (run.is_finished, run.manifest["episodes"], run.manifest["softvt"]) = (false, json!(20), json!("0.0.1"));
+    (run.is_finished, run.manifest.episodes, run.manifest.softvt) = (false, 20, "0.0.1".to_owned());
     let page = render(vec![run]);
     assert!(page.contains("runs/a is not finished: it has 3 of 20 episodes"), "{page}");
     assert!(page.contains("runs/a was written by softvt 0.0.1"));

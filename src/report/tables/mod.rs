@@ -7,6 +7,7 @@ use super::{
     run_summary::RunSummary,
     terminal::{percentile, tau_range},
 };
+use softvt_benchmark::NeededKnowledge;
 use softvt_common::text::{decimal, significant};
 use softvt_evaluation::{
     safety::KAPPAS,
@@ -49,7 +50,7 @@ fn soft_rate(run: &RunSummary, scores: &GroupScores, of: &Rate) -> String {
 fn episodes(run: &RunSummary) -> String {
     let count = run.run.records.len();
     if run.run.is_partial() {
-        format!("{count} of {}", run.run.requested_episodes())
+        format!("{count} of {}", run.run.manifest.requested_episodes())
     } else {
         count.to_string()
     }
@@ -59,14 +60,17 @@ fn episodes(run: &RunSummary) -> String {
 fn needs(runs: &[RunSummary]) -> String {
     let mut suites: BTreeMap<&str, BTreeSet<&str>> = BTreeMap::new();
     for run in runs {
-        if let Some(needs) = run.run.manifest["needs"].as_str() {
-            suites.entry(needs).or_default().insert(&run.summary.suite);
+        if let Some(needs) = run.run.manifest.needs {
+            let words = match needs {
+                NeededKnowledge::Nothing => "nothing",
+                NeededKnowledge::Size => "size",
+                NeededKnowledge::Trial => "to be found by trial",
+            };
+            suites.entry(words).or_default().insert(&run.summary.suite);
         }
     }
     let sentence = |(needs, suites): (&str, BTreeSet<&str>)| {
         let names: Vec<&str> = suites.into_iter().collect();
-        // Runs of earlier versions say "touch".
-        let needs = if matches!(needs, "trial" | "touch") { "to be found by trial" } else { needs };
         format!(" A safe grip needs {needs} in: {}.", names.join(", "))
     };
     suites.into_iter().map(sentence).collect()

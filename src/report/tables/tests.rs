@@ -46,7 +46,7 @@ fn rigid_suites_have_no_safety_and_privileged_policies_are_marked_in_every_table
 #[test]
 fn a_run_in_progress_shows_its_episode_count() {
     let mut run = stored("a", "noop", vec![sample_record()]);
-    run.manifest["episodes"] = serde_json::json!(20);
+    run.manifest.episodes = 20;
     let table = main_table(&summarize_runs(vec![run]));
     assert_eq!(table.rows[0][2], "1 of 20");
 }

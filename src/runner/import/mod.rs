@@ -20,13 +20,10 @@ use crate::{
 };
 use softvt_common::episode_id::EpisodeIndex;
 use softvt_common::{parallel, text::counted};
-use softvt_dataset::{
-    card::ImportedFile,
-    import::{self, ForeignDemo, ForeignFile, InitialCondition},
-};
+use softvt_dataset::import::{self, ForeignDemo, ForeignFile, InitialCondition};
 use softvt_policy::{ToolCommand, builtin::RecordedPolicy};
 use softvt_rollout::{ChunkedPolicy, target_asset};
-use softvt_runs::record::DemonstrationOrigin;
+use softvt_runs::{manifest::ImportedFile, record::DemonstrationOrigin};
 use softvt_scene::{Body, InitialStateOverride};
 use task_matching::{MatchedDemo, match_demos};
 

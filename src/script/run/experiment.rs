@@ -21,8 +21,7 @@ use crate::{
 };
 use softvt_sensing::camera::encode_png;
 
-/// A row of results, with sorted keys.
-pub type ExperimentRow = Map<String, Json>;
+pub use softvt_runs::experiment_folder::ExperimentRow;
 
 /// Summary of an experiment.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]

@@ -9,13 +9,12 @@ use std::{
 };
 
 use include_dir::{Dir, include_dir};
-use sha2::{Digest, Sha256};
 
 use super::{
     error::{ScriptError, SourceLine},
     privilege::is_hidden_path,
 };
-use softvt_common::text::{hex, suggest};
+use softvt_common::{digest::sha256_hex, text::suggest};
 
 /// Contents of the embedded files by their paths in the repository.
 static EMBEDDED: LazyLock<BTreeMap<String, &'static [u8]>> = LazyLock::new(|| {
@@ -67,15 +66,10 @@ pub struct ScriptFiles {
     pub hidden: BTreeSet<String>,
 }
 
-/// SHA-256 in lower-case hexadecimal.
-pub fn sha256(bytes: &[u8]) -> String {
-    hex(&Sha256::digest(bytes))
-}
-
 impl ScriptFiles {
     /// SHA-256 of every file by its name.
     pub fn hashes(&self) -> BTreeMap<String, String> {
-        self.files.iter().map(|(name, bytes)| (name.clone(), sha256(bytes))).collect()
+        self.files.iter().map(|(name, bytes)| (name.clone(), sha256_hex(bytes))).collect()
     }
 }
 

@@ -8,15 +8,15 @@ use std::{
     path::{Path, PathBuf},
 };
 
+use super::record::EpisodeRecord;
 use softvt_common::episode_id::EpisodeIndex;
 use softvt_common::{
+    digest::sha256_hex,
     files::{FileError, replace},
     npy::{NpyArray, NpyError},
 };
 use softvt_policy::{Action, GripTarget};
 use softvt_robot::panda::ARM_DOFS;
-use softvt_rollout::checksum;
-use softvt_runs::record::EpisodeRecord;
 
 /// Numbers per action: of the pose and the closure, with a grip force, with joint positions.
 const WIDTH: usize = 7;
@@ -39,10 +39,16 @@ pub enum ActionsError {
     Shape { path: String, dtype: String, shape: Vec<usize> },
     #[error("{path}: it holds a number that is not finite")]
     NotFinite { path: String },
-    #[error("{path}: it has {actions} actions, and the episode {steps} steps: the file is damaged")]
-    Count { path: String, actions: usize, steps: usize },
-    #[error("{path}: its SHA-256 differs from that in the record of the episode: the file is damaged")]
-    Checksum { path: String },
+    #[error(
+        "{path}: its SHA-256 differs from that in the record of the episode: the file was changed or damaged"
+    )]
+    Digest { path: String },
+}
+
+/// SHA-256 of the numbers of actions as little-endian float64, hexadecimal.
+pub fn sha256(actions: &[Action]) -> String {
+    let numbers = actions.iter().flat_map(|action| action.numbers());
+    sha256_hex(numbers.flat_map(f64::to_le_bytes).collect::<Vec<u8>>())
 }
 
 /// Path of the actions of an episode in the run folder `dir`.
@@ -107,13 +113,9 @@ pub fn read(path: &Path) -> Result<Vec<Action>, ActionsError> {
 pub fn read_checked(dir: &Path, record: &EpisodeRecord) -> Result<Vec<Action>, ActionsError> {
     let path = path(dir, record.header.id.index());
     let actions = read(&path)?;
-    let (steps, path) = (record.stats.steps as usize, path.display().to_string());
-    if actions.len() != steps {
-        return Err(ActionsError::Count { path, actions: actions.len(), steps });
-    }
-    match record.stats.actions_sha256 == checksum(&actions) {
+    match record.stats.actions_sha256 == sha256(&actions) {
         true => Ok(actions),
-        false => Err(ActionsError::Checksum { path }),
+        false => Err(ActionsError::Digest { path: path.display().to_string() }),
     }
 }
 
@@ -124,11 +126,11 @@ mod tests {
     use softvt_geometry::Vec3;
 
     #[test]
-    fn a_damaged_file_is_found_by_its_checksum() {
+    fn a_changed_file_is_found_by_its_digest() {
         let root = tempfile::tempdir().unwrap();
         let actions = [Action::new(Vec3::x(), Vec3::z(), 0.5); 3];
         let mut record = sample_record();
-        (record.stats.steps, record.stats.actions_sha256) = (3, checksum(&actions));
+        record.stats.actions_sha256 = sha256(&actions);
         let at = path(root.path(), record.header.id.index());
         let problem = |record: &EpisodeRecord| read_checked(root.path(), record).unwrap_err().to_string();
         assert!(problem(&record).contains("episode_00000.npy"), "a missing file is named");
@@ -139,11 +141,7 @@ mod tests {
         write(&at, &changed).unwrap();
         assert!(problem(&record).contains("episode_00000.npy: its SHA-256 differs"), "{}", problem(&record));
         write(&at, &actions[..2]).unwrap();
-        assert!(
-            problem(&record).contains("it has 2 actions, and the episode 3 steps"),
-            "{}",
-            problem(&record)
-        );
+        assert!(problem(&record).contains("its SHA-256 differs"), "{}", problem(&record));
     }
 
     #[test]

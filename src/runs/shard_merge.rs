@@ -6,18 +6,18 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use serde_json::Value;
-
 use super::{
     actions::{self, ActionsError},
-    run_folder::{EPISODE_FOLDERS, EPISODES, RUN, SCRIPTS, SUMMARY},
+    manifest::RunManifest,
+    record::EpisodeRecord,
+    run_folder::{EPISODE_FOLDERS, EPISODES, RUN, SCRIPTS, SUMMARY, episode_lines},
     softvtbench_files,
-    stored_run::{StoredRun, StoredRunError, load, remove_folder},
+    stored_run::{StoredRun, StoredRunError, load},
+    summary::SuiteSummary,
 };
 use softvt_common::episode_id::EpisodeIndex;
 use softvt_common::files::{self, FileError};
 use softvt_evaluation::thresholds::{ThresholdError, ThresholdFile};
-use softvt_runs::{record::EpisodeRecord, summary::SuiteSummary};
 
 /// Error of merging shards.
 #[allow(missing_docs, reason = "the messages describe the variants")]
@@ -60,7 +60,7 @@ pub fn merge(out: &Path, dirs: &[PathBuf]) -> Result<Vec<SuiteSummary>, MergeErr
     for dir in dirs {
         for run in load(dir)? {
             in_subfolders |= run.dir != *dir;
-            suites.entry(run.text("suite").to_owned()).or_default().push(run);
+            suites.entry(run.manifest.suite.clone()).or_default().push(run);
         }
     }
     if suites.len() > 1 && !in_subfolders {
@@ -99,7 +99,7 @@ fn remove_folder_if_present(dir: &Path) -> Result<(), FileError> {
 /// A run composed of shards.
 struct MergedRun<'a> {
     shards: &'a [StoredRun],
-    manifest: Value,
+    manifest: RunManifest,
     /// Ordered by task and episode.
     records: Vec<EpisodeRecord>,
 }
@@ -107,20 +107,15 @@ struct MergedRun<'a> {
 impl<'a> MergedRun<'a> {
     /// Checks that the shards are complete and belong together.
     fn new(shards: &'a [StoredRun]) -> Result<Self, MergeError> {
-        let manifest_without_shard = |run: &StoredRun| {
-            let mut manifest = run.manifest.clone();
-            manifest.as_object_mut().map(|map| map.shift_remove("shard"));
-            remove_folder(&mut manifest);
-            manifest
-        };
-        let mut manifest = manifest_without_shard(&shards[0]);
+        let of_run = &shards[0].manifest;
+        let whole = |run: &StoredRun| RunManifest { shard: None, ..run.manifest.identity() };
         let mut seen: BTreeMap<EpisodeIndex, &StoredRun> = BTreeMap::new();
         for run in shards {
             let dir = || run.dir.display().to_string();
-            if run.manifest["shard"].is_null() {
+            if run.manifest.shard.is_none() {
                 return Err(MergeError::NotShard { dir: dir() });
             }
-            if manifest_without_shard(run) != manifest {
+            if whole(run) != whole(&shards[0]) {
                 return Err(MergeError::OtherRun { dir: dir(), first: shards[0].dir.display().to_string() });
             }
             for record in &run.records {
@@ -132,9 +127,8 @@ impl<'a> MergedRun<'a> {
                 actions::read_checked(&run.dir, record)?;
             }
         }
-        let tasks = manifest["tasks"].as_array().into_iter().flatten();
-        let tasks: BTreeSet<usize> = tasks.filter_map(|task| Some(task.as_u64()? as usize)).collect();
-        let episodes = manifest["episodes"].as_u64().unwrap_or(0) as u32;
+        let (tasks, episodes): (BTreeSet<usize>, u32) =
+            (of_run.tasks.iter().copied().collect(), of_run.episodes);
         let expected = tasks.len() * episodes as usize;
         let of_task = |task: usize| (0..episodes).map(move |episode| EpisodeIndex { task, episode });
         let first_missing =
@@ -142,15 +136,13 @@ impl<'a> MergedRun<'a> {
         if let Some(first) = first_missing {
             let is_expected = |index: &&EpisodeIndex| tasks.contains(&index.task) && index.episode < episodes;
             let missing = expected - seen.keys().filter(is_expected).count();
-            let suite = shards[0].text("suite").to_owned();
+            let suite = of_run.suite.clone();
             return Err(MergeError::Missing { suite, missing, expected, first });
         }
         let mut records: Vec<EpisodeRecord> = shards.iter().flat_map(|run| run.records.clone()).collect();
         records.sort_by_key(|r| r.header.id.index());
         // The shards may have run on several machines. Their scripts are looked for in the folder of the first.
-        if let (Some(fields), Some(folder)) = (manifest.as_object_mut(), shards[0].manifest.get("folder")) {
-            fields.insert("folder".to_owned(), folder.clone());
-        }
+        let manifest = RunManifest { shard: None, ..of_run.clone() };
         Ok(Self { shards, manifest, records })
     }
 
@@ -163,7 +155,8 @@ impl<'a> MergedRun<'a> {
                 copy_tree(&run.dir.join(name), &folder.join(name))?;
             }
         }
-        files::write_json_lines(&folder.join(EPISODES), records)?;
+        let lines = folder.join(EPISODES);
+        files::replace(&lines, episode_lines(&lines, records)?)?;
         files::write_json(&folder.join(RUN), manifest)?;
         let scripts = shards[0].dir.join(SCRIPTS);
         if scripts.is_file() {
@@ -174,7 +167,7 @@ impl<'a> MergedRun<'a> {
         softvtbench_files::write_scores(folder, records, &ThresholdFile::read_released(&path)?)?;
         // The records of a rigid twin carry its own suite name.
         let suite = records.first().map_or(shards[0].suite(), |record| &record.header.id.suite);
-        let summary = SuiteSummary::from_records(suite, shards[0].text("policy"), records);
+        let summary = SuiteSummary::from_records(suite, &manifest.policy, records);
         files::write_json(&folder.join(SUMMARY), &summary)?;
         Ok(summary)
     }

@@ -7,39 +7,45 @@ use std::{
 };
 
 use serde::{Deserialize, Serialize};
-use serde_json::Value;
+use serde_json::{Map, Value};
 
-use crate::{error::RunError, run_manifest};
+use super::{
+    manifest::ExperimentManifest,
+    record_line::LineError,
+    run_folder::{RUN, RunFolder, RunFolderError, of_folder},
+};
 use softvt_common::{
     files::{self, json_lines, replace},
     journal::{Journal, whole_lines},
     text::csv_field,
 };
-use softvt_report::run_folder::{RUN, RunFolder, of_folder};
-use softvt_script::ExperimentRow;
 
 /// The finished points, one JSON object per line.
 const POINTS: &str = "points.jsonl";
 /// The rows of all points, one JSON object per line.
-pub(crate) const ROWS: &str = "rows.jsonl";
+pub const ROWS: &str = "rows.jsonl";
 /// The same as a table, with the parameters of the points.
 const TABLE: &str = "rows.csv";
 
 /// Files that softvt writes: the script cannot.
-pub(crate) const RESERVED: [&str; 4] = [RUN, POINTS, ROWS, TABLE];
+pub const RESERVED: [&str; 4] = [RUN, POINTS, ROWS, TABLE];
+
+/// A row of results, with sorted keys; or the fields of a point that are data.
+pub type ExperimentRow = Map<String, Value>;
 
 /// A finished point.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub(crate) struct FinishedPoint {
+pub struct FinishedPoint {
     /// Its number.
     pub point: usize,
     /// Its fields that are data.
     pub parameters: ExperimentRow,
+    /// Its rows.
     pub rows: Vec<ExperimentRow>,
 }
 
 /// The folder of an experiment in progress.
-pub(crate) struct ExperimentFolder {
+pub struct ExperimentFolder {
     dir: PathBuf,
     points: Journal,
 }
@@ -49,11 +55,11 @@ impl ExperimentFolder {
     ///
     /// # Errors
     /// It holds something, or cannot be written to.
-    pub(crate) fn create(dir: &Path, manifest: &impl Serialize) -> Result<Self, RunError> {
+    pub fn create(dir: &Path, manifest: &ExperimentManifest) -> Result<Self, RunFolderError> {
         RunFolder::check_new(dir)?;
         files::create_folder(dir)?;
         let points = Journal::create(&dir.join(POINTS)).map_err(of_folder(dir, POINTS))?;
-        run_manifest::write_new(dir, manifest)?;
+        manifest.write_or_compare(dir)?;
         Ok(Self { dir: dir.into(), points })
     }
 
@@ -61,22 +67,24 @@ impl ExperimentFolder {
     ///
     /// # Errors
     /// It holds another experiment or something else, another process uses it, or a line is not a point.
-    pub(crate) fn resume(
+    pub fn resume(
         dir: &Path,
-        manifest: &impl Serialize,
-    ) -> Result<(Self, BTreeMap<usize, FinishedPoint>), RunError> {
+        manifest: &ExperimentManifest,
+    ) -> Result<(Self, BTreeMap<usize, FinishedPoint>), RunFolderError> {
         let path = dir.join(POINTS);
         if !path.exists() {
             return Ok((Self::create(dir, manifest)?, BTreeMap::new()));
         }
         let (mut points, bytes) = Journal::resume(&path).map_err(of_folder(dir, POINTS))?;
-        run_manifest::write_or_compare(dir, manifest)?;
+        manifest.write_or_compare(dir)?;
         let finished = whole_lines(&bytes).map(|(line, text)| {
-            let point: FinishedPoint = serde_json::from_slice(text)
-                .map_err(|error| RunError::input(format!("{}:{line}: {error}", path.display())))?;
+            let point: FinishedPoint = serde_json::from_slice(text).map_err(|error| {
+                let (path, source) = (path.display().to_string(), LineError::Point(error));
+                RunFolderError::BadLine { path, line, source }
+            })?;
             Ok((point.point, point))
         });
-        let finished = finished.collect::<Result<_, RunError>>()?;
+        let finished = finished.collect::<Result<_, RunFolderError>>()?;
         points.keep_whole_lines(&bytes)?;
         Ok((Self { dir: dir.into(), points }, finished))
     }
@@ -85,7 +93,7 @@ impl ExperimentFolder {
     ///
     /// # Errors
     /// The file cannot be written.
-    pub(crate) fn add(&mut self, point: &FinishedPoint) -> Result<(), RunError> {
+    pub fn add(&mut self, point: &FinishedPoint) -> Result<(), RunFolderError> {
         Ok(self.points.append(&json_lines(&self.dir.join(POINTS), [point])?)?)
     }
 
@@ -93,7 +101,7 @@ impl ExperimentFolder {
     ///
     /// # Errors
     /// A file cannot be removed.
-    pub(crate) fn discard(self) -> Result<(), RunError> {
+    pub fn discard(self) -> Result<(), RunFolderError> {
         for name in [RUN, POINTS] {
             files::remove_if_present(&self.dir.join(name))?;
         }
@@ -105,11 +113,7 @@ impl ExperimentFolder {
     ///
     /// # Errors
     /// A file cannot be written.
-    pub(crate) fn write_rows(
-        &mut self,
-        points: &[FinishedPoint],
-        columns: &[String],
-    ) -> Result<(), RunError> {
+    pub fn write_rows(&mut self, points: &[FinishedPoint], columns: &[String]) -> Result<(), RunFolderError> {
         self.points.replace(&json_lines(&self.dir.join(POINTS), points)?)?;
         let rows = points.iter().flat_map(|point| &point.rows);
         files::write_json_lines(&self.dir.join(ROWS), rows)?;
@@ -187,14 +191,19 @@ mod tests {
     #[test]
     fn an_interrupted_experiment_keeps_its_points() {
         let dir = tempfile::tempdir().expect("a folder");
-        let (dir, manifest) = (dir.path().join("e"), json!({ "experiment": "e", "seed": 0 }));
+        let manifest: ExperimentManifest = serde_json::from_value(json!({
+            "softvt": "0", "script": "e.lua", "experiment": "e", "points": 2, "seed": 0, "options": {}, "arguments": [],
+            "set": [], "sources": {}, "folder": "/here",
+        }))
+        .expect("a manifest");
+        let dir = dir.path().join("e");
         let second = point(1, json!({ "gap": 1 }), json!([{ "d": 2 }]));
         let mut folder = ExperimentFolder::create(&dir, &manifest).expect("created");
         folder.add(&second).expect("written");
         assert!(ExperimentFolder::resume(&dir, &manifest).is_err(), "another process uses it");
         drop(folder);
         assert!(ExperimentFolder::create(&dir, &manifest).is_err());
-        let other = ExperimentFolder::resume(&dir, &json!({ "experiment": "e", "seed": 1 }));
+        let other = ExperimentFolder::resume(&dir, &ExperimentManifest { seed: 1, ..manifest.clone() });
         assert!(other.err().expect("refused").to_string().contains("seed: 0 before, 1 now"));
         let path = dir.join(POINTS);
         let whole = std::fs::read(&path).expect("read");

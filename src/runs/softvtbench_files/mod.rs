@@ -12,6 +12,7 @@ use std::{
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
+use crate::record::{EpisodeHeader, EpisodeRecord};
 use softvt_common::episode_id::{EpisodeId, EpisodeIndex};
 use softvt_common::files::{self, FileError, replace};
 use softvt_common::text::csv_field;
@@ -21,7 +22,6 @@ use softvt_evaluation::{
     thresholds::ThresholdFile,
 };
 use softvt_geometry::Vec3;
-use softvt_runs::record::{EpisodeHeader, EpisodeRecord};
 
 /// Folder within a run folder.
 pub const FOLDER: &str = "softvtbench";

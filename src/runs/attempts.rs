@@ -10,18 +10,19 @@ use std::{
     sync::Mutex,
 };
 
+use super::{
+    record_line::LineError,
+    run_folder::{ATTEMPTS, RunFolderError, of_folder},
+};
 use softvt_common::{
     episode_id::EpisodeIndex,
     files,
     journal::{Journal, whole_lines},
     parallel::lock,
 };
-use softvt_report::run_folder::{ATTEMPTS, of_folder};
-
-use crate::error::RunError;
 
 /// The attempts at the episodes of one run, of all its sessions. Their file exists until the run is complete.
-pub(crate) struct Attempts {
+pub struct Attempts {
     path: PathBuf,
     begun: Mutex<BegunAttempts>,
 }
@@ -37,15 +38,17 @@ impl Attempts {
     ///
     /// # Errors
     /// Their file cannot be read.
-    pub(crate) fn open(dir: &Path) -> Result<Self, RunError> {
+    pub fn open(dir: &Path) -> Result<Self, RunFolderError> {
         let (path, mut begun) = (dir.join(ATTEMPTS), BegunAttempts::default());
         if path.is_file() {
             let (mut file, bytes) = Journal::resume(&path).map_err(of_folder(dir, ATTEMPTS))?;
             file.keep_whole_lines(&bytes)?;
             begun.file = Some(file);
             for (number, line) in whole_lines(&bytes) {
-                let index = serde_json::from_slice(line).map_err(|error| {
-                    RunError::input(format!("{}:{number}: not an attempt: {error}", path.display()))
+                let index = serde_json::from_slice(line).map_err(|error| RunFolderError::BadLine {
+                    path: path.display().to_string(),
+                    line: number,
+                    source: LineError::Attempt(error),
                 })?;
                 *begun.counts.entry(index).or_insert(0) += 1;
             }
@@ -57,7 +60,7 @@ impl Attempts {
     ///
     /// # Errors
     /// The file cannot be written.
-    pub(crate) fn begin(&self, index: EpisodeIndex) -> Result<(), RunError> {
+    pub fn begin(&self, index: EpisodeIndex) -> Result<(), RunFolderError> {
         let mut begun = lock(&self.begun);
         *begun.counts.entry(index).or_insert(0) += 1;
         let line = files::json_lines(&self.path, [index])?;
@@ -72,12 +75,12 @@ impl Attempts {
     }
 
     /// Number of attempts at an episode, if there were several.
-    pub(crate) fn several(&self, index: EpisodeIndex) -> Option<u32> {
+    pub fn several(&self, index: EpisodeIndex) -> Option<u32> {
         lock(&self.begun).counts.get(&index).copied().filter(|count| *count > 1)
     }
 
     /// True before the first attempt at any episode.
-    pub(crate) fn is_empty(&self) -> bool {
+    pub fn is_empty(&self) -> bool {
         lock(&self.begun).counts.is_empty()
     }
 
@@ -85,7 +88,7 @@ impl Attempts {
     ///
     /// # Errors
     /// It cannot be removed.
-    pub(crate) fn remove(&self) -> Result<(), RunError> {
+    pub fn remove(&self) -> Result<(), RunFolderError> {
         lock(&self.begun).file = None;
         Ok(files::remove_if_present(&self.path)?)
     }

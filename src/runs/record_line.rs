@@ -1,0 +1,95 @@
+//! A line of `episodes.jsonl`: the record of an episode, and its SHA-256 as the last key.
+//!
+//! The digest is of the bytes before the comma in front of its key. It finds a line that was changed or damaged. It does
+//! not prove that the simulation gave the record: whoever changes a line can compute a new digest. A replay proves that.
+
+use std::path::Path;
+
+use super::{record::EpisodeRecord, record_check::RecordError};
+use softvt_common::{
+    digest::sha256_hex,
+    files::{FileError, json_lines},
+};
+
+/// A line is not the record of an episode as it was written.
+#[derive(Debug, thiserror::Error)]
+#[allow(missing_docs, reason = "the messages describe the variants")]
+pub enum LineError {
+    #[error(transparent)]
+    Record(#[from] RecordError),
+    #[error("it has no record_sha256")]
+    NoDigest,
+    #[error(
+        "its SHA-256 is not the record_sha256 at its end: the line was changed after the episode, or damaged"
+    )]
+    OtherDigest,
+    #[error("not an attempt: {0}")]
+    Attempt(serde_json::Error),
+    #[error("not a point: {0}")]
+    Point(serde_json::Error),
+}
+
+/// What is before the digest in a line.
+const KEY: &str = ",\"record_sha256\":\"";
+
+/// What follows a record in its line.
+fn ending(record: &[u8]) -> String {
+    format!("{KEY}{}\"}}", sha256_hex(record))
+}
+
+/// The line of a record, with its line break. `path` is its file, for errors.
+///
+/// # Errors
+/// The record cannot be written as JSON.
+pub fn write_line(path: &Path, record: &EpisodeRecord) -> Result<String, FileError> {
+    let json = json_lines(path, [record])?;
+    let record = json.strip_suffix("}\n").unwrap_or(&json);
+    Ok(format!("{record}{}\n", ending(record.as_bytes())))
+}
+
+/// The record in a line without its line break.
+///
+/// # Errors
+/// The text is not a record, has no digest, or has that of another text.
+pub fn read_line(line: &[u8]) -> Result<EpisodeRecord, LineError> {
+    let (record, end) = line.split_at(line.len().saturating_sub(ending(b"").len()));
+    if end == ending(record).as_bytes() {
+        return Ok(EpisodeRecord::from_json(&[record, b"}"].concat())?);
+    }
+    if end.starts_with(KEY.as_bytes()) {
+        return Err(LineError::OtherDigest);
+    }
+    EpisodeRecord::from_json(line)?;
+    Err(LineError::NoDigest)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::sample_record;
+
+    #[test]
+    fn every_changed_byte_of_a_line_is_found() {
+        let record = sample_record();
+        let line = write_line(Path::new("episodes.jsonl"), &record).unwrap();
+        let line = line.strip_suffix('\n').unwrap().as_bytes();
+        assert_eq!(read_line(line).unwrap(), record);
+        for at in 0..line.len() {
+            let mut changed = line.to_vec();
+            changed[at] ^= 1;
+            assert!(read_line(&changed).is_err(), "byte {at}");
+        }
+    }
+
+    #[test]
+    fn a_line_is_plain_json_that_begins_with_the_record() {
+        let record = sample_record();
+        let line = write_line(Path::new("episodes.jsonl"), &record).unwrap();
+        let json = serde_json::to_string(&record).unwrap();
+        assert!(line.starts_with(json.strip_suffix('}').unwrap()) && line.ends_with("\"}\n"));
+        let value: serde_json::Value = serde_json::from_str(&line).unwrap();
+        let (last, digest) = value.as_object().unwrap().iter().next_back().unwrap();
+        assert_eq!((last.as_str(), digest.as_str().unwrap().len()), ("record_sha256", 64));
+        assert!(matches!(read_line(json.as_bytes()), Err(LineError::NoDigest)), "as 0.2.1 wrote it");
+    }
+}
