@@ -7,7 +7,7 @@ use crate::{
         ImportedColours, ImportedImage, ImportedMaterial, MeshFormat, MeshImportError, MeshImportOptions,
         import, import_colours,
     },
-    mesh::{Mesh, MeshError},
+    mesh::Mesh,
     shape::Shape,
     surface_mesh::SurfaceMesh,
 };
