@@ -16,7 +16,7 @@ use crate::{
     selection::{check_episodes, path_component, select_episodes, select_tasks},
     suite_run::{PreparedRun, SuiteRun},
 };
-use softvt_benchmark::{Condition, ObjectType, Plan, REFERENCE, ShiftValue, Suite, Task, settings::Settings};
+use softvt_benchmark::{Condition, ObjectType, Plan, REFERENCE, Suite, Task, settings::Settings};
 use softvt_common::{files::replace, text};
 use softvt_report::condition_table::{ConditionOutcome, ConditionRow, ConditionTable};
 use softvt_runs::{
@@ -148,15 +148,6 @@ fn condition_cases(
                 same.condition.name, condition.name
             )));
         }
-        let changes = !(condition.shift.is_empty() && condition.set.is_empty())
-            || condition.policy.is_some()
-            || condition.rigid_twin;
-        if !changes && condition.name != REFERENCE {
-            return Err(config.error(format!(
-                "the condition {:?} changes nothing; give it shifts, set, policy or rigid_twin",
-                condition.name
-            )));
-        }
         check_shared_changes(config, condition)?;
         let mut changed = config.clone();
         changed.shifts.extend(condition.shift.iter().cloned());
@@ -190,18 +181,17 @@ fn condition_cases(
 
 /// Checks that a condition sets nothing that the command line sets: it would not hold in that condition.
 fn check_shared_changes(config: &RunConfig, condition: &Condition) -> Result<(), RunError> {
-    let refuse = |field: &'static str, change: String| {
-        let message = format!("the condition {:?} sets it as well; leave it out", condition.name);
-        Err(config.error_of(field, change, message))
+    let sets = |name: &str| {
+        condition.shift.iter().any(|own| own.name == name) || condition.set.iter().any(|(own, _)| own == name)
     };
-    let sets_shift = |shift: &&ShiftValue| condition.shift.iter().any(|own| own.name == shift.name);
-    if let Some(ShiftValue { name, value }) = config.shifts.iter().find(sets_shift) {
-        return refuse("shifts", format!("{name}={value}"));
-    }
-    let sets_setting = |(path, _): &&(String, String)| condition.set.iter().any(|(own, _)| own == path);
-    match config.settings.iter().find(sets_setting) {
-        Some((path, value)) => refuse("settings", format!("{path}={value}")),
+    let shifts = config.shifts.iter().map(|shift| ("shifts", &shift.name, shift.value.to_string()));
+    let settings = config.settings.iter().map(|(path, value)| ("settings", path, value.clone()));
+    match shifts.chain(settings).find(|(_, name, _)| sets(name)) {
         None => Ok(()),
+        Some((field, name, value)) => {
+            let message = format!("the condition {:?} sets it as well; leave it out", condition.name);
+            Err(config.error_of(field, format!("{name}={value}"), message))
+        }
     }
 }
 

@@ -100,7 +100,7 @@ fn invalid_conditions_are_reported_before_anything_runs() {
         ),
         (
             "{ name = \"a\" }",
-            "the condition \"a\" changes nothing; give it shifts, set, policy or rigid_twin",
+            "the condition \"a\" sets what the suite has without it; leave it out, or give other values",
         ),
         (
             "{ name = \"a\", shift = { mass = 1 }, set = { [\"robot.latency\"] = 0 } }",

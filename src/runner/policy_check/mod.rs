@@ -8,6 +8,8 @@
 mod fit;
 mod sampling;
 mod series;
+#[cfg(test)]
+mod tests;
 
 use std::{
     path::Path,
