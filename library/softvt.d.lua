@@ -1579,19 +1579,21 @@ local List = {}
 ---@field id string? Name of the episode in a judged run (--seed-file), from which its draws cannot be computed.
 local EpisodeBrief = {}
 
----The observation of a policy at a control step. Poses are of the tool centre point in the robot's base frame. The true state of the scene is not part of it.
+---The observation of a policy at a control step. Poses are of the tool centre point in the robot's base frame. The true state of the scene is not part of it. Its closure requires observes.drives.
 ---@class softvt.Observation
 ---@field time number Time since the policy took over, s.
----@field position number[] Tool position, m.
----@field axis_angle number[] Tool orientation as axis-angle, rad, continuous along the episode: its length may exceed π.
----@field quaternion number[] Tool orientation as quaternion w, x, y, z with w ≥ 0.
----@field joints number[] The seven joint angles of the arm, rad.
 ---@field width number Measured distance of the gels, 0 to 0.08 m, with the steps and the offset of a real hand; exact with observes.drives.
----@field closure number Last commanded closure, 0 open to 1 closed; requires observes.drives.
 ---@field prompt string The instruction.
 ---@field tactile softvt.Fingers Tactile sensors; requires observes.tactile.
 ---@field tactile_history softvt.Fingers[] Tactile sensors in the last 1 to 8 control steps, oldest first; requires observes.tactile.
 ---@field force softvt.Forces True forces on the gels; requires observes.force.
+---@field position number[] Tool position, m.
+---@field axis_angle number[] Tool orientation as axis-angle, rad, continuous along the episode: its length may exceed π.
+---@field quaternion number[] Tool orientation as quaternion w, x, y, z with w ≥ 0.
+---@field joints number[] The seven joint angles of the arm, rad.
+---@field joint_velocities number[] Velocities of the arm's joints, rad/s.
+---@field joint_torques number[] Torques of the arm's drives in the physics step before, N m; gravity is compensated and not part of them.
+---@field closure number Last commanded closure, 0 open to 1 closed.
 local Observation = {}
 
 ---Returns the image of a camera in observes.cameras, 224 × 224 unless the scene defines another size.

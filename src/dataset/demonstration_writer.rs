@@ -1,6 +1,7 @@
 //! [`DemonstrationWriter`]: renders a recorded rollout into the files of one demonstration.
 
 use std::{
+    borrow::Cow,
     collections::BTreeSet,
     path::{Path, PathBuf},
 };
@@ -8,16 +9,20 @@ use std::{
 use image::RgbImage;
 use rust_hdf5::H5Dataset;
 use serde_json::Value;
+use sha2::{Digest, Sha256};
 
 use super::{
-    DatasetError, Demonstration, OptionalStream,
-    hdf5::{ChunkedSteps, Hdf5Writer, write_file},
-    layout::{DEPTH_STREAMS, IMAGE_STREAMS},
+    DatasetError, OptionalStream,
+    hdf5::{ChunkedSteps, Hdf5Writer, write_file, write_text_attributes},
+    stream::DIGEST,
+    streams::{self, DEPTH_FLAG, DEPTHS, IMAGES, Rollout, StreamSpec},
 };
 use softvt_benchmark::CONTROL_HZ;
+use softvt_common::text::hex;
 use softvt_media::video::VideoWriter;
+use softvt_policy::NumberType;
 use softvt_robot::tactile::IMAGE_SIZE;
-use softvt_rollout::StateRecording;
+use softvt_rollout::{FinishedEpisode, StateRecording};
 use softvt_scene::{Camera, STANDARD_CAMERAS};
 use softvt_sensing::{
     camera::{RenderedImage, resize},
@@ -34,6 +39,8 @@ pub struct DemonstrationWriter<'a> {
     pub preview: PathBuf,
     /// True to store images in the HDF5 file as well.
     pub store_images: bool,
+    /// True to store the true state.
+    pub has_privileged: bool,
     /// Further streams of the HDF5 file.
     pub streams: &'a BTreeSet<OptionalStream>,
     /// `env_args` of the HDF5 file.
@@ -41,32 +48,35 @@ pub struct DemonstrationWriter<'a> {
 }
 
 impl DemonstrationWriter<'_> {
-    /// Renders the state before each action and writes all files. The HDF5 file is written last: its presence
-    /// marks a complete demonstration.
+    /// Renders the state before each action of a rollout with a state recording and a trace, and writes all files.
+    /// `is_closed` has one entry per control step: true if the gripper is commanded to hold. The HDF5 file is written
+    /// last: its presence marks a complete demonstration.
     ///
     /// # Errors
     /// A sensor cannot be simulated, a file not written, or `is_cancelled` returned true. There is no HDF5 file then.
     pub fn write(
         &self,
+        finished: &FinishedEpisode,
         recording: &mut StateRecording,
-        mut demonstration: Demonstration,
+        is_closed: &[bool],
         is_cancelled: impl Fn() -> bool,
     ) -> Result<(), DatasetError> {
-        write_file(&self.hdf5, self.environment, demonstration.steps(), 1, |writer| {
-            self.write_contents(writer, recording, &mut demonstration, is_cancelled)
+        write_file(&self.hdf5, self.environment, finished.actions.len(), 1, |writer| {
+            self.write_contents(writer, finished, recording, is_closed, is_cancelled)
         })
     }
 
     fn write_contents(
         &self,
         writer: &mut Hdf5Writer,
+        finished: &FinishedEpisode,
         recording: &mut StateRecording,
-        demonstration: &mut Demonstration,
+        is_closed: &[bool],
         is_cancelled: impl Fn() -> bool,
     ) -> Result<(), DatasetError> {
-        let (steps, path) = (demonstration.steps(), writer.path);
-        writer.write_attributes(0, &demonstration.record, steps)?;
-        let mut renderer = StepRenderer::new(recording, self.streams.contains(&OptionalStream::Depth))?;
+        let (steps, path) = (finished.actions.len(), writer.path);
+        writer.write_attributes(0, &finished.record)?;
+        let mut renderer = StepRenderer::new(recording, self.has_stream(DEPTH_FLAG))?;
         let mut outputs: Option<ImageOutputs> = None;
         let mut markers = Vec::with_capacity(steps);
         for step in 0..steps {
@@ -82,20 +92,23 @@ impl DemonstrationWriter<'_> {
             outputs.push(path, &images, step + 1 == steps)?;
             markers.push(images.markers);
         }
-        demonstration.set_markers(&markers);
-        if self.streams.contains(&OptionalStream::JointTorques) {
-            demonstration.set_joint_torques(&renderer.recording.joint_torques);
+        let rollout = Rollout::new(finished, recording, is_closed, &markers);
+        for stream in rollout.streams(self.has_privileged, |flag| self.has_stream(flag)) {
+            writer.write_stream(0, steps, &stream)?;
         }
-        writer.write_streams(0, demonstration)?;
         outputs.map_or(Ok(()), |outputs| outputs.finish(self))
+    }
+
+    fn has_stream(&self, flag: &str) -> bool {
+        self.streams.iter().any(|stream| stream.name() == flag)
     }
 }
 
-/// Images per chunk, in the order of [`IMAGE_STREAMS`]. Images of the static camera and of the fingers hardly change
+/// Images per chunk, in the order of [`IMAGES`]. Images of the static camera and of the fingers hardly change
 /// within four steps and compress better together; those of the wrist camera change in every step.
 const IMAGES_PER_CHUNK: [usize; 4] = [4, 1, 4, 4];
 
-/// Writes an image stream to HDF5, chunk by chunk.
+/// Writes a stream of images or depth to HDF5, chunk by chunk.
 struct ImageStreamWriter {
     dataset: H5Dataset,
     name: &'static str,
@@ -103,10 +116,36 @@ struct ImageStreamWriter {
     /// Images of the current chunk; numbers are little-endian.
     bytes: Vec<u8>,
     chunks_written: usize,
+    /// Of all images so far.
+    hash: Sha256,
 }
 
 impl ImageStreamWriter {
+    /// A stream of images, or of depth, of the size of `image`.
+    fn create(
+        writer: &mut Hdf5Writer,
+        spec: &StreamSpec,
+        image: &RgbImage,
+        length: ChunkedSteps,
+    ) -> Result<Self, DatasetError> {
+        let size = [image.height() as usize, image.width() as usize];
+        let (row_shape, shuffle_stride) = match spec.number_type {
+            // Within a chunk the values of one pixel in successive images are stored next to each other, so that static
+            // parts of the image compress well.
+            NumberType::U8 if length.per_chunk > 1 => (vec![size[0], size[1], 3], image.len()),
+            NumberType::U8 => (vec![size[0], size[1], 3], 1),
+            NumberType::F32 | NumberType::F64 => (size.to_vec(), size_of::<f32>()),
+        };
+        let key = format!("data/demo_0/{}", spec.path);
+        let dataset = writer.create_dataset(&key, spec.number_type, length, &row_shape, shuffle_stride)?;
+        write_text_attributes(writer.path, &key, &dataset, &spec.attributes)?;
+        let images_per_chunk = length.per_chunk;
+        let hash = Sha256::new();
+        Ok(Self { dataset, name: spec.path, images_per_chunk, bytes: Vec::new(), chunks_written: 0, hash })
+    }
+
     fn push(&mut self, path: &Path, image: &[u8], is_last: bool) -> Result<(), DatasetError> {
+        self.hash.update(image);
         self.bytes.extend_from_slice(image);
         let chunk_bytes = self.images_per_chunk * image.len();
         // HDF5 chunks are always full: the last one is padded with its last image.
@@ -119,14 +158,19 @@ impl ImageStreamWriter {
             self.chunks_written += 1;
             self.bytes.clear();
         }
+        if is_last {
+            let digest = hex(&self.hash.finalize_reset());
+            write_text_attributes(path, self.name, &self.dataset, &[(DIGEST, digest)])?;
+        }
         Ok(())
     }
 }
 
 /// Writers that take one image per step.
 struct ImageOutputs {
+    /// Those of images, if they are stored, then those of depth.
     streams: Vec<ImageStreamWriter>,
-    depths: Vec<ImageStreamWriter>,
+    stores_images: bool,
     videos: Vec<VideoWriter>,
     preview: VideoWriter,
 }
@@ -140,44 +184,28 @@ impl ImageOutputs {
     ) -> Result<Self, DatasetError> {
         let video =
             |image: &RgbImage| VideoWriter::new(image.width() as usize, image.height() as usize, CONTROL_HZ);
+        let images = IMAGES.into_iter().zip(&first.images).zip(IMAGES_PER_CHUNK);
+        let depths = DEPTHS.into_iter().zip(&first.images).zip(IMAGES_PER_CHUNK);
+        let images = images.filter(|_| files.store_images);
         let mut streams = Vec::new();
-        let named = IMAGE_STREAMS.into_iter().zip(&first.images).zip(IMAGES_PER_CHUNK);
-        for ((name, image), images_per_chunk) in named.filter(|_| files.store_images) {
-            let images_per_chunk = images_per_chunk.min(steps);
-            let length = ChunkedSteps { steps, per_chunk: images_per_chunk };
-            let dataset = writer.create_image_dataset(0, name, length, image.width(), image.height())?;
-            let bytes = Vec::with_capacity(images_per_chunk * image.len());
-            streams.push(ImageStreamWriter { dataset, name, images_per_chunk, bytes, chunks_written: 0 });
-        }
-        let mut depths = Vec::new();
-        let named = DEPTH_STREAMS.into_iter().zip(&first.images).zip(IMAGES_PER_CHUNK);
-        let has_depth = files.streams.contains(&OptionalStream::Depth);
-        for ((name, image), images_per_chunk) in named.filter(|_| has_depth) {
-            let images_per_chunk = images_per_chunk.min(steps);
-            let length = ChunkedSteps { steps, per_chunk: images_per_chunk };
-            let dataset = writer.create_depth_dataset(0, name, length, image.width(), image.height())?;
-            depths.push(ImageStreamWriter {
-                dataset,
-                name,
-                images_per_chunk,
-                bytes: Vec::new(),
-                chunks_written: 0,
-            });
+        for ((name, image), per_chunk) in images.chain(depths.filter(|_| files.has_stream(DEPTH_FLAG))) {
+            let Some(spec) = streams::named(name) else { continue };
+            let length = ChunkedSteps { steps, per_chunk: per_chunk.min(steps) };
+            streams.push(ImageStreamWriter::create(writer, &spec, image, length)?);
         }
         Ok(Self {
             streams,
-            depths,
+            stores_images: files.store_images,
             videos: first.video_frames.iter().map(video).collect::<Result<_, _>>()?,
             preview: video(&first.preview())?,
         })
     }
 
     fn push(&mut self, path: &Path, images: &StepImages, is_last: bool) -> Result<(), DatasetError> {
-        for (stream, image) in self.streams.iter_mut().zip(&images.images) {
-            stream.push(path, image, is_last)?;
-        }
-        for (stream, depth) in self.depths.iter_mut().zip(&images.depths) {
-            let bytes: Vec<u8> = depth.iter().flat_map(|metres| metres.to_le_bytes()).collect();
+        let stored = images.images.iter().filter(|_| self.stores_images);
+        let stored = stored.map(|image| Cow::Borrowed(image.as_raw().as_slice()));
+        let depths = images.depths.iter().map(|depth| depth.iter().flat_map(|m| m.to_le_bytes()).collect());
+        for (stream, bytes) in self.streams.iter_mut().zip(stored.chain(depths)) {
             stream.push(path, &bytes, is_last)?;
         }
         for (video, frame) in self.videos.iter_mut().zip(&images.video_frames) {
@@ -201,9 +229,9 @@ const CELL_HEIGHT: u32 = IMAGE_SIZE[1] as u32;
 /// Camera and tactile images of one state.
 #[derive(Clone, Debug)]
 struct StepImages {
-    /// In the order of [`IMAGE_STREAMS`].
+    /// In the order of [`IMAGES`].
     images: [RgbImage; 4],
-    /// In the order of [`DEPTH_STREAMS`], m; empty if depth is not asked for.
+    /// In the order of [`DEPTHS`], m; empty if depth is not asked for.
     depths: [Vec<f32>; 2],
     /// In the order of [`super::layout::VIDEO_STREAMS`].
     video_frames: [RgbImage; 4],

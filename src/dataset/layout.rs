@@ -15,20 +15,9 @@ pub const ATTEMPTS: &str = "attempts";
 /// Demonstrations of tasks that are still being recorded.
 pub const PARTS: &str = ".parts";
 
-/// Image streams: third-person camera, wrist camera, left and right finger.
-pub const IMAGE_STREAMS: [&str; 4] =
-    ["agentview_rgb", "eye_in_hand_rgb", "gsmini_left_tactile_rgb", "gsmini_right_tactile_rgb"];
-/// Depth of the images of both cameras.
-pub const DEPTH_STREAMS: [&str; 2] = ["agentview_depth", "eye_in_hand_depth"];
-/// Their videos, those of the fingers with markers.
+/// Videos: third-person camera, wrist camera, left and right finger, those of the fingers with markers.
 pub const VIDEO_STREAMS: [&str; 4] =
     ["agentview_rgb", "eye_in_hand_rgb", "gsmini_left_markers_rgb", "gsmini_right_markers_rgb"];
-
-/// True for the path of a stream of images or of their depth, such as `obs/agentview_rgb`.
-pub fn is_image_stream(name: &str) -> bool {
-    let names = || IMAGE_STREAMS.into_iter().chain(DEPTH_STREAMS);
-    name.strip_prefix("obs/").is_some_and(|stream| names().any(|known| known == stream))
-}
 
 /// A file of an attempt and its place in the finished dataset.
 #[derive(Clone, Debug, PartialEq, Eq)]

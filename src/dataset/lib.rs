@@ -8,7 +8,6 @@
 
 pub mod card;
 pub mod check;
-mod demonstration;
 pub mod demonstration_writer;
 mod error;
 pub mod export;
@@ -16,13 +15,12 @@ mod grip_labels;
 mod hdf5;
 pub mod import;
 pub mod layout;
-
 pub mod manifest;
-mod privileged;
 pub mod stats;
 mod stream;
+mod streams;
 
-pub use demonstration::Demonstration;
 pub use error::DatasetError;
 pub use hdf5::{FloatArray, ImageStack, TaskFile, merge_parts};
-pub use stream::{DataStream, OptionalStream, StreamValues};
+pub use stream::{DataStream, Demonstration, OptionalStream, StreamValues};
+pub use streams::stream_tables;

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use serde::Serialize;
 
-use super::{DatasetError, TaskFile, demonstration};
+use super::{DatasetError, TaskFile, streams};
 use softvt_benchmark::CONTROL_DT;
 use softvt_common::text::{TextColumn, TextTable, decimal};
 use softvt_media::histogram::{self, Histogram};
@@ -66,7 +66,7 @@ pub fn column_statistics(paths: &[impl AsRef<Path>]) -> Result<Vec<ColumnStatist
         let file = TaskFile::open(path.as_ref())?;
         for &demo in &file.demos {
             let actions: Vec<[f64; 7]> =
-                demonstration::continuous(&file.actions(demo)?).map(Action::to_array).collect();
+                streams::continuous(&file.actions(demo)?).map(Action::to_array).collect();
             lengths.push(actions.len() as f64);
             speeds.extend(actions.windows(2).map(|pair| commanded_speed(pair[0], pair[1])));
             for action in actions {

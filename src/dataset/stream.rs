@@ -1,30 +1,63 @@
 //! [`DataStream`]: one quantity of a demonstration over time.
 
-use serde::{Deserialize, Serialize};
-use softvt_geometry::Pose;
-use softvt_robot::rotation;
+use std::sync::LazyLock;
 
-/// Streams that a recording has only if they are asked for.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, clap::ValueEnum)]
-#[serde(rename_all = "kebab-case")]
-pub enum OptionalStream {
-    /// Depth of the images of both cameras, m.
-    #[value(help = None::<&str>)]
-    Depth,
-    /// Torques of the arm's drives, N m.
-    #[value(help = None::<&str>)]
-    JointTorques,
-}
+use clap::{ValueEnum, builder::PossibleValue};
+use serde::{Deserialize, Deserializer, Serialize, Serializer, de::Error};
+
+use sha2::{Digest, Sha256};
+use softvt_common::text::hex;
+use softvt_policy::{NumberType, ROBOT_STREAMS};
+use softvt_runs::record::EpisodeRecord;
+
+use super::streams::DEPTH_FLAG;
+
+/// A value of `softvt record --streams`: a stream that a recording has only if it is asked for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub struct OptionalStream(&'static str);
+
+static OPTIONAL_STREAMS: LazyLock<Vec<OptionalStream>> = LazyLock::new(|| {
+    let of_robot = ROBOT_STREAMS.iter().filter_map(|stream| stream.recorded.as_ref()?.flag);
+    [DEPTH_FLAG].into_iter().chain(of_robot).map(OptionalStream).collect()
+});
 
 impl OptionalStream {
+    /// The stream of a name.
+    pub fn named(name: &str) -> Option<Self> {
+        OPTIONAL_STREAMS.iter().copied().find(|stream| stream.0 == name)
+    }
+
     /// Name in flags and files.
     pub fn name(self) -> &'static str {
-        match self {
-            Self::Depth => "depth",
-            Self::JointTorques => "joint-torques",
-        }
+        self.0
     }
 }
+
+impl ValueEnum for OptionalStream {
+    fn value_variants<'a>() -> &'a [Self] {
+        &OPTIONAL_STREAMS
+    }
+
+    fn to_possible_value(&self) -> Option<PossibleValue> {
+        Some(PossibleValue::new(self.0))
+    }
+}
+
+impl Serialize for OptionalStream {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.serialize_str(self.0)
+    }
+}
+
+impl<'de> Deserialize<'de> for OptionalStream {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let name = String::deserialize(deserializer)?;
+        Self::named(&name).ok_or_else(|| D::Error::custom(format!("unknown stream {name:?}")))
+    }
+}
+
+/// Attribute of a stream with the SHA-256 of its numbers, as they were recorded.
+pub(super) const DIGEST: &str = "sha256";
 
 /// Values of a [`DataStream`], step by step.
 #[derive(Clone, Debug, PartialEq)]
@@ -50,7 +83,54 @@ pub struct DataStream {
     pub attributes: Vec<(String, String)>,
 }
 
+/// A rollout as training data, without its images: the state before each control step, and the action commanded in it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Demonstration {
+    /// Header and verdict of the episode.
+    pub record: EpisodeRecord,
+    /// All streams other than images and depth.
+    pub streams: Vec<DataStream>,
+}
+
 impl StreamValues {
+    /// Numbers of a type.
+    pub(super) fn new(number_type: NumberType, numbers: Vec<f64>) -> Self {
+        match number_type {
+            NumberType::F64 => Self::F64(numbers),
+            NumberType::F32 => Self::F32(numbers.into_iter().map(|x| x as f32).collect()),
+            NumberType::U8 => Self::U8(numbers.into_iter().map(|x| x as u8).collect()),
+        }
+    }
+
+    /// The values as `f64`.
+    pub(super) fn into_f64(self) -> Vec<f64> {
+        match self {
+            Self::F64(values) => values,
+            Self::F32(values) => values.into_iter().map(f64::from).collect(),
+            Self::U8(values) => values.into_iter().map(f64::from).collect(),
+        }
+    }
+
+    /// SHA-256 of the numbers in little endian, hexadecimal.
+    pub(super) fn sha256(&self) -> String {
+        let mut hash = Sha256::new();
+        match self {
+            Self::F64(values) => values.iter().for_each(|x| hash.update(x.to_le_bytes())),
+            Self::F32(values) => values.iter().for_each(|x| hash.update(x.to_le_bytes())),
+            Self::U8(values) => hash.update(values),
+        }
+        hex(&hash.finalize())
+    }
+
+    /// Their type.
+    pub(super) fn number_type(&self) -> NumberType {
+        match self {
+            Self::F64(_) => NumberType::F64,
+            Self::F32(_) => NumberType::F32,
+            Self::U8(_) => NumberType::U8,
+        }
+    }
+
     pub(super) fn len(&self) -> usize {
         match self {
             Self::F64(values) => values.len(),
@@ -58,43 +138,4 @@ impl StreamValues {
             Self::U8(values) => values.len(),
         }
     }
-}
-
-impl DataStream {
-    /// A stream of 64-bit numbers, of this shape per step.
-    pub fn f64(name: impl Into<String>, row_shape: &[usize], values: Vec<f64>) -> Self {
-        Self::new(name.into(), row_shape, StreamValues::F64(values))
-    }
-
-    /// A stream of 32-bit numbers, of this shape per step.
-    pub fn f32(name: impl Into<String>, row_shape: &[usize], values: Vec<f32>) -> Self {
-        Self::new(name.into(), row_shape, StreamValues::F32(values))
-    }
-
-    /// A stream of bytes, of this shape per step.
-    pub fn u8(name: impl Into<String>, row_shape: &[usize], values: Vec<u8>) -> Self {
-        Self::new(name.into(), row_shape, StreamValues::U8(values))
-    }
-
-    fn new(name: String, row_shape: &[usize], values: StreamValues) -> Self {
-        Self { name, row_shape: row_shape.to_vec(), values, attributes: Vec::new() }
-    }
-
-    /// Adds an attribute.
-    pub fn attribute(mut self, name: &str, text: &str) -> Self {
-        self.attributes.push((name.to_owned(), text.to_owned()));
-        self
-    }
-
-    /// Adds the attributes `unit` and, if it is not empty, `frame`.
-    pub fn unit(self, unit: &str, frame: &str) -> Self {
-        let stream = self.attribute("unit", unit);
-        if frame.is_empty() { stream } else { stream.attribute("frame", frame) }
-    }
-}
-
-/// Position, and quaternion w x y z with w ≥ 0.
-pub(super) fn pose_row(pose: &Pose) -> [f64; 7] {
-    let (p, q) = (pose.translation.vector, rotation::canonical(&pose.rotation));
-    [p.x, p.y, p.z, q.w, q.i, q.j, q.k]
 }

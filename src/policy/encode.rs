@@ -7,10 +7,9 @@ use super::{
     CameraImage, EpisodeBrief, Observation, QueryId, RobotState,
     msgpack::{map, pack_array},
     observation::last,
-    profile::{ObservationSource, Profile, ProfileInput, RobotStatePart},
+    profile::{ObservationSource, Profile, ProfileInput},
 };
 use softvt_common::npy::NpyArray;
-use softvt_robot::rotation;
 use softvt_sensing::tactile::MARKER_COUNT;
 
 /// Content of an entry of an observation, before it is packed.
@@ -73,7 +72,8 @@ pub fn content(
         }
         ObservationSource::State { parts } => {
             let row = |robot: &RobotState| {
-                let numbers: Vec<f32> = parts.iter().flat_map(|part| state(robot, *part)).collect();
+                let numbers = parts.iter().flat_map(|part| (part.stream().read)(robot));
+                let numbers: Vec<f32> = numbers.map(|number| number as f32).collect();
                 NpyArray::from_f32(vec![numbers.len()], numbers)
             };
             stacked(input, observation.robot_states(steps).into_iter().map(row))?
@@ -161,31 +161,4 @@ pub fn openpi(observation: &Observation, profile: &Profile, query: &QueryId) -> 
 pub fn image_array(image: RgbImage) -> NpyArray {
     let shape = vec![image.height() as usize, image.width() as usize, 3];
     NpyArray::from_bytes(shape, image.into_raw())
-}
-
-fn state(o: &RobotState, part: RobotStatePart) -> Vec<f32> {
-    let quaternion = || rotation::from_axis_angle(&o.ee_axis_angle_b).into_inner();
-    let numbers: Vec<f64> = match part {
-        RobotStatePart::Position => o.ee_position_b.iter().copied().collect(),
-        RobotStatePart::AxisAngle => o.ee_axis_angle_b.iter().copied().collect(),
-        RobotStatePart::QuaternionWxyz => {
-            let q = quaternion();
-            vec![q.w, q.i, q.j, q.k]
-        }
-        RobotStatePart::QuaternionXyzw => {
-            let q = quaternion();
-            vec![q.i, q.j, q.k, q.w]
-        }
-        RobotStatePart::Joints => o.joints.to_vec(),
-        RobotStatePart::JointVelocities => o.joint_velocities.to_vec(),
-        RobotStatePart::JointTorques => o.joint_torques.to_vec(),
-        RobotStatePart::GripperWidth => vec![o.gripper_width_m],
-        RobotStatePart::FingerPosition => vec![0.5 * o.gripper_width_m],
-        RobotStatePart::SensedWidth => vec![o.sensed_width_m],
-        RobotStatePart::SensedFingerPosition => vec![0.5 * o.sensed_width_m],
-        RobotStatePart::FingerPair => vec![0.5 * o.gripper_width_m, -0.5 * o.gripper_width_m],
-        RobotStatePart::Closure => vec![o.closure],
-    };
-    debug_assert_eq!(numbers.len(), part.count());
-    numbers.into_iter().map(|x| x as f32).collect()
 }

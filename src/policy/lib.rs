@@ -13,6 +13,7 @@ mod observation;
 pub mod osc;
 pub mod profile;
 pub mod remote;
+mod robot_state;
 pub mod transport;
 
 pub use command_resolver::CommandResolver;
@@ -21,6 +22,10 @@ pub use interface::{
     Action, ActionChunk, EncodedGrip, EpisodeBrief, Policy, PolicyError, QueryId, ToolCommand, ToolMotion,
 };
 pub use observation::{
-    CameraImage, Observation, PadForce, PastStep, RobotState, SensorStreams, TactileFrame, TactileHistory,
+    CameraImage, Observation, PadForce, PastStep, SensorStreams, TactileFrame, TactileHistory,
+};
+pub use robot_state::{
+    ExportedStream, JOINT_NAMES, MAX_ANGLE, MAX_POSITION_M, NumberType, ROBOT_STREAMS, RecordedStream,
+    RobotState, RobotStream, StatePart, pose_row,
 };
 pub use softvt_robot::GripTarget;

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use image::RgbImage;
 
-use softvt_geometry::Vec3;
+use super::RobotState;
 use softvt_sensing::tactile::{
     HISTORY_LENGTH, MARKER_COUNT, MarkerStyle, Markers, PadWrench, TactileMosaicLayout, Taxels, mosaic,
     mosaic_cell,
@@ -29,42 +29,6 @@ pub struct SensorStreams {
     pub past_steps: usize,
     /// Number of earlier control steps whose camera images are requested, at most `past_steps`.
     pub past_images: usize,
-}
-
-/// Proprioception: what the robot measures of itself.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct RobotState {
-    /// Tool position in the robot base frame, m.
-    pub ee_position_b: Vec3,
-    /// Tool orientation in the base frame as axis-angle, rad: continuous along the episode, from the vector that is
-    /// nearest to a hand that points straight down, (π, 0, 0).
-    pub ee_axis_angle_b: Vec3,
-    /// Arm joint angles, rad.
-    pub joints: [f64; 7],
-    /// Arm joint velocities, rad/s.
-    pub joint_velocities: [f64; 7],
-    /// Torques of the arm's drives in the last physics step, N m. Gravity is compensated and not part of them.
-    pub joint_torques: [f64; 7],
-    /// Exact gripper width, m: 0 to 0.08 between the apexes of the gels.
-    pub gripper_width_m: f64,
-    /// Gripper width with the errors of a real hand (settings `robot.width_sensor`), m.
-    pub sensed_width_m: f64,
-    /// Closure last commanded, 0 (open) ..= 1 (closed).
-    pub closure: f64,
-}
-
-impl RobotState {
-    /// A robot at rest with the tool at the origin of the base frame and the gripper open.
-    pub const ORIGIN: Self = Self {
-        ee_position_b: Vec3::new(0.0, 0.0, 0.0),
-        ee_axis_angle_b: Vec3::new(0.0, 0.0, 0.0),
-        joints: [0.0; 7],
-        joint_velocities: [0.0; 7],
-        joint_torques: [0.0; 7],
-        gripper_width_m: 0.08,
-        sensed_width_m: 0.08,
-        closure: 0.0,
-    };
 }
 
 /// Observation of a control step.

@@ -2,8 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::{EncodedGrip, GripHysteresis, SensorStreams};
-use softvt_robot::{GripTarget, Side, panda::ARM_DOFS};
+use super::{EncodedGrip, GripHysteresis, JOINT_NAMES, SensorStreams, StatePart};
+use softvt_robot::{GripTarget, Side};
 use softvt_scene::STANDARD_CAMERAS;
 use softvt_sensing::tactile::{HISTORY_LENGTH, MarkerStyle, TactileMosaicLayout};
 
@@ -90,7 +90,7 @@ pub enum ObservationSource {
     /// State of the robot, float32 (n).
     State {
         /// Parts of the vector, in order.
-        parts: Vec<RobotStatePart>,
+        parts: Vec<StatePart>,
     },
     /// The instruction, text.
     Prompt,
@@ -120,55 +120,6 @@ pub enum ObservationSource {
     /// Seed of the request for policies that draw random numbers, an integer below 2³²; see
     /// [`QueryId::seed`](super::QueryId::seed).
     QuerySeed,
-}
-
-/// A part of a state vector.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum RobotStatePart {
-    /// Tool position in the base frame, m (3).
-    Position,
-    /// Tool orientation in the base frame as axis-angle, rad (3).
-    AxisAngle,
-    /// Tool orientation in the base frame as a quaternion w, x, y, z with w ≥ 0 (4).
-    QuaternionWxyz,
-    /// Tool orientation in the base frame as a quaternion x, y, z, w with w ≥ 0 (4).
-    QuaternionXyzw,
-    /// Arm joint angles, rad (7).
-    Joints,
-    /// Arm joint velocities, rad/s (7).
-    JointVelocities,
-    /// Torques of the arm's drives, N m, without gravity, which is compensated (7).
-    JointTorques,
-    /// Exact distance between the gels, m: 0 to 0.08 (1).
-    GripperWidth,
-    /// Exact position of one finger, half the gripper width, m: 0 to 0.04 (1).
-    FingerPosition,
-    /// Distance between the gels with the errors of a real hand, m (1).
-    SensedWidth,
-    /// Half of [`SensedWidth`](Self::SensedWidth), m (1).
-    SensedFingerPosition,
-    /// Positions of both fingers in robosuite's convention, m: half the gripper width and its negative (2).
-    FingerPair,
-    /// Closure last commanded, 0 to 1 (1).
-    Closure,
-}
-
-impl RobotStatePart {
-    /// Number of components.
-    pub fn count(self) -> usize {
-        match self {
-            Self::Position | Self::AxisAngle => 3,
-            Self::QuaternionWxyz | Self::QuaternionXyzw => 4,
-            Self::Joints | Self::JointVelocities | Self::JointTorques => 7,
-            Self::FingerPair => 2,
-            Self::GripperWidth
-            | Self::FingerPosition
-            | Self::SensedWidth
-            | Self::SensedFingerPosition
-            | Self::Closure => 1,
-        }
-    }
 }
 
 /// Encoding of an action: numbers for the motion of the arm and one for the gripper. Further numbers are padding.
@@ -241,9 +192,6 @@ impl ActionEncoding {
 
 /// Names of the numbers of an action that give a pose or a displacement.
 pub const POSE_NAMES: [&str; 6] = ["x", "y", "z", "axis_angle_x", "axis_angle_y", "axis_angle_z"];
-/// Names of the arm's joints.
-pub const JOINT_NAMES: [&str; ARM_DOFS] =
-    ["joint_1", "joint_2", "joint_3", "joint_4", "joint_5", "joint_6", "joint_7"];
 
 /// Meaning of the numbers of an action before that of the gripper.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -435,21 +383,20 @@ impl Profile {
     pub fn named(name: &str) -> Option<Self> {
         let both = |name: &str| vec![format!("observation/{name}"), name.to_owned()];
         let plain = |camera: &str| ObservationSource::Camera { camera: camera.to_owned(), half_turn: false };
-        let state = |hand: &[RobotStatePart]| ObservationSource::State {
-            parts: [&[RobotStatePart::Position, RobotStatePart::AxisAngle], hand].concat(),
+        let state = |names: &[&str]| ObservationSource::State {
+            parts: names.iter().filter_map(|name| StatePart::named(name)).collect(),
         };
+        let pose_and = |hand: &[&'static str]| state(&[&["position", "axis_angle"], hand].concat());
         // SoftVTBench's interfaces and LIBERO's have the exact position of the fingers.
         let finger = match name {
-            "vision" | "visuo_tactile" | "vision_joints" | "visuo_tactile_joints" => {
-                RobotStatePart::SensedFingerPosition
-            }
-            _ => RobotStatePart::FingerPosition,
+            "vision" | "visuo_tactile" | "vision_joints" | "visuo_tactile_joints" => "sensed_finger_position",
+            _ => "finger_position",
         };
         let input = ProfileInput::new;
         let mut inputs = vec![
             input(both("image"), plain(STANDARD_CAMERAS[0])),
             input(both("wrist_image"), plain(STANDARD_CAMERAS[1])),
-            input(both("state"), state(&[finger])),
+            input(both("state"), pose_and(&[finger])),
             input(vec!["prompt".to_owned()], ObservationSource::Prompt),
         ];
         let mosaic = |markers| ObservationSource::TactileImage { layout: TactileMosaicLayout::Rows, markers };
@@ -465,7 +412,7 @@ impl Profile {
         let actions = match name {
             "vision" => absolute(GripperValues { code: GripCode::Binary, ..closure }),
             "vision_drives" => {
-                inputs[2].source = state(&[RobotStatePart::FingerPosition, RobotStatePart::Closure]);
+                inputs[2].source = pose_and(&["finger_position", "closure"]);
                 absolute(closure)
             }
             "visuo_tactile" => {
@@ -473,7 +420,7 @@ impl Profile {
                 absolute(closure)
             }
             "vision_joints" | "visuo_tactile_joints" => {
-                inputs[2].source = ObservationSource::State { parts: vec![RobotStatePart::Joints, finger] };
+                inputs[2].source = state(&["joints", finger]);
                 if name == "visuo_tactile_joints" {
                     inputs.extend(tactile);
                 }
@@ -501,7 +448,7 @@ impl Profile {
                     |camera: &str| ObservationSource::Camera { camera: camera.to_owned(), half_turn: true };
                 inputs[0].source = turned(STANDARD_CAMERAS[0]);
                 inputs[1].source = turned(STANDARD_CAMERAS[1]);
-                inputs[2].source = state(&[RobotStatePart::FingerPair]);
+                inputs[2].source = pose_and(&["finger_pair"]);
                 inputs[..3].iter_mut().for_each(|input| input.keys.truncate(1));
                 ActionEncoding::new(
                     PoseEncoding::DeltaOsc { translation_m: 0.05, rotation_rad: 0.5 },
@@ -567,7 +514,10 @@ mod tests {
             assert_eq!((actions.numbers(), actions.names().len()), (8, 8));
             assert_eq!(actions.names()[6..], ["joint_7", "gripper"]);
             let ObservationSource::State { parts } = &inputs[2].source else { panic!("{inputs:?}") };
-            assert_eq!(parts[..], [RobotStatePart::Joints, RobotStatePart::SensedFingerPosition]);
+            assert_eq!(
+                parts.iter().map(|part| part.name()).collect::<Vec<_>>(),
+                ["joints", "sensed_finger_position"]
+            );
         }
         assert_eq!(Profile::named("libero").unwrap().actions.numbers(), 7);
     }
@@ -580,21 +530,6 @@ mod tests {
         assert!(streams("visuo_tactile").tactile && streams("softvtbench").force);
         let visuo_tactile = streams("visuo_tactile");
         assert_eq!((visuo_tactile.past_steps, visuo_tactile.past_images), (7, 0));
-    }
-
-    #[test]
-    fn only_vision_drives_has_the_command_and_the_exact_width() {
-        let hand = |name| match &Profile::named(name).unwrap().inputs[2].source {
-            ObservationSource::State { parts } => parts[2..].to_vec(),
-            other => panic!("{other:?}"),
-        };
-        for name in ["vision", "visuo_tactile"] {
-            assert_eq!(hand(name), [RobotStatePart::SensedFingerPosition], "{name}");
-        }
-        assert_eq!(hand("vision_drives"), [RobotStatePart::FingerPosition, RobotStatePart::Closure]);
-        for name in ["softvtbench", "softvtbench_v02"] {
-            assert_eq!(hand(name), [RobotStatePart::FingerPosition], "{name}");
-        }
     }
 
     #[test]

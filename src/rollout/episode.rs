@@ -42,8 +42,8 @@ use softvt_physics::{
     BodyId,
     world::{StepFailure, WorldSnapshot},
 };
-use softvt_policy::{Action, Observation, PolicyError, SensorStreams};
-use softvt_robot::{Side, ik::ArmAngles, panda::ARM_DOFS, rotation};
+use softvt_policy::{Action, Observation, PolicyError, RobotState, SensorStreams};
+use softvt_robot::{Side, ik::ArmAngles, rotation};
 use softvt_runs::{
     actions,
     record::{EpisodeHeader, EpisodeRecord, RolloutStats, UnreachableCommand},
@@ -197,7 +197,7 @@ pub struct Episode {
 #[derive(Clone)]
 struct RecordedState {
     frame: WorldSnapshot,
-    joint_torques: [f64; ARM_DOFS],
+    robot: RobotState,
     stage: Option<TaskStage>,
 }
 
@@ -503,8 +503,7 @@ impl Episode {
         let frame = Sensors::frame(&self.sim);
         let robot = self.sim.robot.state(&self.sim.world, self.sensors.seed());
         if let Some(recorded) = &mut self.recorded {
-            let joint_torques = robot.joint_torques;
-            recorded.push(RecordedState { frame: frame.clone(), joint_torques, stage: self.judge.stage() });
+            recorded.push(RecordedState { frame: frame.clone(), robot, stage: self.judge.stage() });
         }
         self.history.push(frame, robot, self.streams.past_steps);
     }
@@ -647,7 +646,7 @@ impl Episode {
         let reference = self.evidence.reference(self.target).cloned();
         let scores = self.judge.scores().to_vec();
         let recording = self.recorded.map(|states| {
-            let joint_torques = states.iter().map(|state| state.joint_torques).collect();
+            let robot = states.iter().map(|state| state.robot).collect();
             let stages = states.iter().map(|state| state.stage).collect();
             let frames = states.into_iter().map(|state| state.frame).collect();
             let targets = &record.verdict.targets;
@@ -659,7 +658,7 @@ impl Episode {
             let settled = StateDeformation::worst(settled);
             let deformation = std::iter::once(settled).chain(scores.iter().map(in_step)).collect();
             let (sensors, target) = (self.sensors, self.target);
-            StateRecording { sensors, frames, joint_torques, target, deformation, stages }
+            StateRecording { sensors, frames, robot, target, deformation, stages }
         });
         let (actions, mut joint_commands) = (self.actions, self.joint_commands);
         let last = joint_commands.last().copied().unwrap_or_else(|| self.sim.robot.q(&self.sim.world));

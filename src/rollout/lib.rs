@@ -107,8 +107,8 @@ pub use scene_warnings::scene_warnings;
 pub use sensor_assets::{SensingError, SensorAssets};
 pub use sensor_noise::SensorSeed;
 pub use sensors::{
-    BodyConfiguration, CAMERA_IMAGE_SUFFIXES, CloseUp, Proprioception, Sensors, StateDeformation,
-    StateRecording, TACTILE_IMAGE_SUFFIXES, TACTILE_IMAGES, check_sensors, strain_colour,
+    BodyConfiguration, CAMERA_IMAGE_SUFFIXES, CloseUp, Sensors, StateDeformation, StateRecording,
+    TACTILE_IMAGE_SUFFIXES, TACTILE_IMAGES, check_sensors, strain_colour,
 };
 pub use settled_box::SettledBox;
 pub use simulation::{ArticulatedPart, ObjectInstance, SettleError, Simulation, state_hash};

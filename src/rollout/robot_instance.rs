@@ -200,14 +200,16 @@ impl RobotInstance {
 
     /// Measurements of the robot's own sensors. `seed` is that of the errors of its width sensor.
     pub fn state(&self, world: &World, seed: SensorSeed) -> RobotState {
-        let width = self.width(world);
+        let (width, tool_b) = (self.width(world), self.tool_b(world));
         let articulation = world.articulation(self.articulation);
         RobotState {
-            ee_position_b: self.tool_b(world).translation.vector,
+            ee_position_b: tool_b.translation.vector,
+            ee_rotation_b: tool_b.rotation,
             ee_axis_angle_b: self.ee_axis_angle_b(world),
             joints: self.q(world),
             joint_velocities: std::array::from_fn(|i| articulation.state.v[i]),
             joint_torques: std::array::from_fn(|i| articulation.drive_forces()[i]),
+            fingers_m: std::array::from_fn(|i| articulation.state.q[ARM_DOFS + i]),
             gripper_width_m: width,
             sensed_width_m: seed.sensed_width(&self.spec.width_sensor, width, world.step_count()),
             closure: self.closure(),

@@ -32,7 +32,7 @@ use softvt_common::{
     text::counted,
 };
 use softvt_dataset::{
-    Demonstration, OptionalStream,
+    OptionalStream,
     card::{DatasetCard, KeptOutcome, TaskCount, rejection_counts},
     check,
     demonstration_writer::DemonstrationWriter,
@@ -222,17 +222,17 @@ impl<'a> SuiteRecording<'a> {
         let mut is_holding: Vec<bool> = recorded_grip.unwrap_or_else(commanded_grip);
         // The recorded grip can have fewer entries than there are steps, or more. The last one continues.
         is_holding.resize(finished.actions.len(), is_holding.last().copied().unwrap_or_default());
-        let demonstration = Demonstration::new(&finished, &states, is_holding, self.options.has_privileged);
         let (paths, attempt) = (self.paths(job.task.id), job.episode);
         let writer = DemonstrationWriter {
             hdf5: paths.part(attempt, "hdf5"),
             videos: VIDEO_STREAMS.map(|video| paths.part(attempt, &format!("{video}.mp4"))),
             preview: paths.part(attempt, "preview.mp4"),
             store_images: self.options.has_images,
+            has_privileged: self.options.has_privileged,
             streams: &self.options.streams,
             environment: &self.environment,
         };
-        writer.write(&mut states, demonstration, cancel::requested)?;
+        writer.write(&finished, &mut states, &is_holding, cancel::requested)?;
         Ok(finished)
     }
 

@@ -238,7 +238,7 @@ fn setting_details(setting: &Setting) -> String {
 
 fn stub_class(out: &mut String, class: &Class) {
     let _ = writeln!(out, "---{}\n---@class {}", class.doc.trim(), class.name);
-    for field in class.fields {
+    for field in class.all_fields() {
         let (ty, doc) = class_field(field);
         let _ = writeln!(out, "---@field {} {ty} {doc}", field.name);
     }
@@ -280,7 +280,7 @@ pub fn reference() -> String {
     out.push_str("- `softvt.version`: version of softvt, a string.\n\n## Objects\n");
     for class in api::CLASSES {
         let _ = writeln!(out, "\n### {}\n\n{}\n", class.name, class.doc.trim());
-        for field in class.fields {
+        for field in class.all_fields() {
             let (ty, doc) = class_field(field);
             let writable = if matches!(field.access, Access::Write(_)) { ", writable" } else { "" };
             let _ = writeln!(out, "- `{}` ({}{writable}): {doc}", field.name, cell(&ty));

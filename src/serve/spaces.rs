@@ -1,32 +1,22 @@
 //! Spaces of observations and actions for clients: types, shapes and bounds. The bounds are those of possible values,
 //! not of likely ones.
 
-use std::{collections::BTreeSet, f64::consts::PI};
+use std::collections::BTreeSet;
 
 use rmpv::Value;
 
 use super::config::ServerConfig;
 use softvt_common::text::MAX_TEXT_BYTES;
 use softvt_policy::{
-    Observation,
+    MAX_ANGLE, MAX_POSITION_M, Observation,
     encode::{ObservationEntry, content},
     msgpack::map,
-    profile::{
-        ActionEncoding, GripCode, GripperValues, ObservationSource, PoseEncoding, ProfileInput,
-        RobotStatePart,
-    },
+    profile::{ActionEncoding, GripCode, GripperValues, ObservationSource, PoseEncoding, ProfileInput},
 };
 use softvt_robot::panda::{self, JointRange};
 
-/// Bound of positions along any axis of the base frame, m; larger than the reach of the arm.
-const MAX_POSITION_M: f64 = 2.0;
-/// Bound of rotation angles, rad: vectors that are continuous along an episode pass half a turn.
-const MAX_ANGLE: f64 = 2.0 * PI;
 /// Bound of marker positions, px; larger than a tactile image.
 const MAX_MARKER_PX: f64 = 1e4;
-/// Bound of joint velocities, rad/s, and of the torques of their drives, N m; larger than what the arm reaches.
-const MAX_JOINT_SPEED: f64 = 1e3;
-const MAX_TORQUE: f64 = 1e3;
 /// Bound of forces, N.
 const MAX_FORCE_N: f64 = 1e6;
 
@@ -110,7 +100,7 @@ fn array_space(dtype: &str, shape: &[usize], low: Vec<f64>, high: Vec<f64>) -> V
 fn magnitude_bounds(input: &ProfileInput) -> Vec<f64> {
     match &input.source {
         ObservationSource::State { parts } => {
-            let one = parts.iter().flat_map(|part| vec![max_magnitude(*part); part.count()]);
+            let one = parts.iter().flat_map(|part| vec![part.stream().bound; part.stream().width]);
             one.collect::<Vec<_>>().repeat(input.steps())
         }
         ObservationSource::Depth { .. } => vec![f64::INFINITY],
@@ -125,19 +115,6 @@ fn magnitude_bounds(input: &ProfileInput) -> Vec<f64> {
         | ObservationSource::Tactile { .. } => {
             vec![255.0]
         }
-    }
-}
-
-/// Largest magnitude of a number of the state.
-fn max_magnitude(part: RobotStatePart) -> f64 {
-    match part {
-        RobotStatePart::Position => MAX_POSITION_M,
-        RobotStatePart::AxisAngle => MAX_ANGLE,
-        RobotStatePart::Joints => 2.0 * PI,
-        RobotStatePart::JointVelocities => MAX_JOINT_SPEED,
-        RobotStatePart::JointTorques => MAX_TORQUE,
-        // Quaternions, the closure, and widths in metres.
-        _ => 1.0 + 1e-3,
     }
 }
 

@@ -166,7 +166,8 @@ fn depth_is_recorded_as_policies_observe_it() {
     let run = project.run("x.lua").set("cameras.width", 40).set("cameras.height", 30);
     let recording = Recording::new(run, 1, "a");
     let recording = recording.with(|options| {
-        options.streams = [OptionalStream::Depth, OptionalStream::JointTorques].into();
+        options.streams =
+            ["depth", "joint-torques"].map(|name| OptionalStream::named(name).expect("a stream")).into();
     });
     recording.record();
     let a = project.path("a");
@@ -186,7 +187,7 @@ fn depth_is_recorded_as_policies_observe_it() {
     }
     assert_eq!(file.stream(0, "obs/joint_torques").expect("a stream").row_shape, [7]);
     let read = file.read(0).expect("a demonstration");
-    assert!(read.observed.iter().all(|stream| !stream.name.ends_with("_depth")), "images are not read");
+    assert!(read.streams.iter().all(|stream| !stream.name.ends_with("_depth")), "images are not read");
     // With other streams it is another recording.
     let other = recording.with(|options| options.streams.clear());
     assert!(other.refusal().contains("another recording"), "{}", other.refusal());
@@ -228,7 +229,7 @@ fn datasets_are_checked_and_reproduced() {
         .write("a/manifest.jsonl", manifest.replacen("\"language\":\"", "\"language\":\"now ", 1).as_bytes());
     let problems = check::folder(&a, check::CheckScope::Whole).expect("a dataset").problems;
     assert!(
-        matches!(&problems[..], [one] if one.contains("/data/demo_0, attribute language: ")
+        matches!(&problems[..], [one] if one.contains("/data/demo_0, attribute metadata_json: language is ")
             && one.contains("the manifest says \"now ")),
         "{problems:?}"
     );
@@ -236,7 +237,7 @@ fn datasets_are_checked_and_reproduced() {
         .write("a/manifest.jsonl", manifest.replacen("\"success\":true", "\"success\":false", 1).as_bytes());
     let problems = check::folder(&a, check::CheckScope::Whole).expect("a dataset").problems;
     assert!(
-        matches!(&problems[..], [one] if one.contains("attribute metadata_json: safety is true, the manifest says false")),
+        matches!(&problems[..], [one] if one.contains("attribute metadata_json: success is true, the manifest says false")),
         "{problems:?}"
     );
     project.write("a/manifest.jsonl", manifest.as_bytes());

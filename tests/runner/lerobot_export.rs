@@ -184,7 +184,9 @@ fn key_of_lerobot(name: &str) -> &str {
 fn joint_positions_and_torques_are_exported() {
     let project = project();
     let recording = Recording::new(project.run("x.lua").tasks(&[0]), 1, "data");
-    recording.with(|options| options.streams = [OptionalStream::JointTorques].into()).record();
+    recording
+        .with(|options| options.streams = [OptionalStream::named("joint-torques").expect("a stream")].into())
+        .record();
     let joints =
         |format, out: &str| ExportConfig { control: ArmControl::Joints, ..config(&project, format, out) };
     export(&joints(V21, "a"));

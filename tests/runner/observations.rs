@@ -305,10 +305,12 @@ fn an_observation_has_no_field_for_hidden_state() {
         observation;
     let RobotState {
         ee_position_b: _,
+        ee_rotation_b: _,
         ee_axis_angle_b: _,
         joints: _,
         joint_velocities: _,
         joint_torques: _,
+        fingers_m: _,
         gripper_width_m: _,
         sensed_width_m: _,
         closure: _,

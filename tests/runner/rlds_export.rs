@@ -64,7 +64,9 @@ fn rlds(project: &Project, out: &str) -> ExportConfig {
 fn records_have_the_numbers_of_a_lerobot_export() {
     let project = project();
     let recording = Recording::new(project.run("x.lua"), 2, "data");
-    recording.with(|options| options.streams = [OptionalStream::JointTorques].into()).record();
+    recording
+        .with(|options| options.streams = [OptionalStream::named("joint-torques").expect("a stream")].into())
+        .record();
     let exported = export(&ExportConfig { threads: 1, ..rlds(&project, "a") });
     assert_eq!((exported.episodes, exported.tasks), (4, 2));
     export(&ExportConfig { threads: 3, ..rlds(&project, "b") });

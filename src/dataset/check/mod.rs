@@ -1,6 +1,9 @@
-//! Consistency checks of a dataset: files, shapes, values, and relations between streams.
-
-mod readings;
+//! Checks of a dataset: that its files belong together, and that streams are as they were recorded, or at least as they
+//! are declared.
+//!
+//! The digest of a stream shows every change after the recording. Streams without one, of earlier versions or written by
+//! other programs, are checked for type, shape and range. What a digest cannot show, that the numbers follow from the
+//! commands, a re-simulation does.
 
 use std::{
     collections::{BTreeMap, BTreeSet},
@@ -11,24 +14,17 @@ use std::{
 use serde_json::{Value, json};
 
 use super::{
-    DatasetError, StreamValues, TaskFile,
+    DataStream, DatasetError, TaskFile,
     card::DatasetCard,
-    demonstration::{CAMERA_POSES, JOINT_ACTIONS, JOINT_TORQUES, actions_stream_name},
-    grip_labels::{self, OPEN_FORCE},
-    layout::{CARD, DEPTH_STREAMS, IMAGE_STREAMS, MANIFEST, is_image_stream},
+    layout::{CARD, MANIFEST, TaskPaths},
     manifest::{self, ManifestEntry},
+    streams::{self, Presence, RowShape, StreamSpec},
 };
-use softvt_benchmark::{CONTROL_DT, CONTROL_HZ};
+use softvt_benchmark::CONTROL_HZ;
 use softvt_common::{files::FileError, text::counted};
 use softvt_geometry::{Quat, Vec3};
 use softvt_media::video;
-use softvt_policy::{Action, profile::GripCode};
-use softvt_robot::{
-    ik::ArmAngles,
-    panda::{self, ARM_DOFS, JointRange},
-    rotation,
-};
-use softvt_sensing::tactile::MARKER_COUNT;
+use softvt_robot::rotation;
 
 /// Result of a check.
 #[derive(Debug, Default)]
@@ -43,34 +39,8 @@ pub struct CheckReport {
     pub problems: Vec<String>,
 }
 
-/// Streams of every demonstration, with their shape per step.
-const REQUIRED_STREAMS: [(&str, &[usize]); 15] = [
-    ("actions", &[7]),
-    ("actions_binary", &[7]),
-    (JOINT_ACTIONS, &[ARM_DOFS]),
-    ("rewards", &[]),
-    ("dones", &[]),
-    ("timestamps", &[]),
-    ("obs/eef_pose", &[7]),
-    ("obs/state", &[7]),
-    ("obs/arm_joint_pos", &[7]),
-    ("obs/gripper_pos", &[2]),
-    ("obs/gripper_width", &[1]),
-    ("obs/gripper_width_sensed", &[1]),
-    ("obs/gripper_close_norm", &[1]),
-    ("obs/gripper_closure", &[1]),
-    ("obs/gripper_marker_motion", &[2, 2, MARKER_COUNT, 2]),
-];
-/// Tolerance of rotations, quaternion lengths and timestamps.
+/// Tolerance of rotations and of the lengths of quaternions.
 const TOLERANCE: f64 = 1e-6;
-/// Excess over the limits of a joint up to which a commanded position is likely meant, rad.
-const JOINT_MARGIN: f64 = 0.05;
-/// Largest distance between the place of an action and that of its joint positions in half of the steps, m.
-const MAX_JOINT_TARGET_ERROR_M: f64 = 0.02;
-/// Distance in half of the steps up to which joint positions are not taken for those of another step, m.
-const MIN_SHIFT_ERROR_M: f64 = 0.001;
-/// Greatest depth that a camera can see, m: another one is in another unit.
-const MAX_DEPTH_M: f32 = 100.0;
 
 /// What is read for a check.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -79,13 +49,6 @@ pub enum CheckScope {
     Whole,
     /// All but images, depth and videos, which are most of the bytes.
     Numbers,
-}
-
-/// Index of the first joint whose position is beyond its limits.
-fn joint_beyond_limits(row: &[f64; ARM_DOFS]) -> Option<usize> {
-    let is_beyond =
-        |(q, range): (&f64, &JointRange)| *q < range.lower - JOINT_MARGIN || *q > range.upper + JOINT_MARGIN;
-    row.iter().zip(&panda::joint_ranges()).position(is_beyond)
 }
 
 impl CheckReport {
@@ -155,43 +118,16 @@ pub fn folder(root: &Path, scope: CheckScope) -> Result<CheckReport, DatasetErro
 
 /// Checks that a demonstration is the one that its line of the manifest describes.
 fn check_entry(report: &mut CheckReport, file: &TaskFile, entry: &ManifestEntry) {
-    let demo = entry.demo_id;
-    let Some(steps) = report.take(file.steps(demo)) else { return };
-    let key = format!("/data/demo_{demo}");
-    if steps != entry.num_samples {
-        let what = format!("{steps} steps, the manifest says {}", entry.num_samples);
-        report.add(&file.path, &key, what);
-    }
-    let attributes = [
-        ("task_suite", &entry.task_suite),
-        ("language", &entry.language),
-        ("asset_name", &entry.asset_name),
-        ("state_hash", &entry.state_hash),
-    ];
-    for (name, expected) in attributes {
-        if let Some(found) = report.take(file.text(demo, name))
-            && found != *expected
-        {
-            let what = format!("{found:?}, the manifest says {expected:?}");
-            report.add(&file.path, &format!("{key}, attribute {name}"), what);
-        }
-    }
-    // The HDF5 library does not read numeric attributes of groups; the record has the same values.
-    let Some(record) = report.take(file.record(demo)) else { return };
-    let id = &record.header.id;
-    for (name, found, listed) in [
-        ("task", json!(id.task), json!(entry.task_id)),
-        ("episode", json!(id.episode), json!(entry.episode)),
-        ("safety", json!(record.verdict.safety), json!(entry.success)),
-        ("d_peak", json!(record.d_peak()), json!(entry.d_peak)),
-        ("seed", json!(id.base_seed), json!(entry.seed)),
-        ("notes", json!(record.stats.notes), json!(entry.notes)),
-        ("metrics", json!(record.stats.metrics), json!(entry.metrics)),
-    ] {
-        if found != listed {
-            let what = format!("{name} is {found}, the manifest says {listed}");
-            report.add(&file.path, &format!("{key}, attribute metadata_json"), what);
-        }
+    let Some(record) = report.take(file.record(entry.demo_id)) else { return };
+    let paths = TaskPaths { root: PathBuf::new(), suite: String::new(), task: entry.task_id };
+    let (hdf5_path, video_files) = (entry.hdf5_path.clone(), entry.video_files.clone());
+    let own = ManifestEntry::new(&paths, entry.demo_id, &record);
+    let (own, listed) = (json!(ManifestEntry { hdf5_path, video_files, ..own }), json!(entry));
+    for (name, listed) in
+        listed.as_object().into_iter().flatten().filter(|(name, listed)| own[*name] != **listed)
+    {
+        let what = format!("{name} is {}, the manifest says {listed}", own[name]);
+        report.add(&file.path, &format!("/data/demo_{}, attribute metadata_json", entry.demo_id), what);
     }
 }
 
@@ -261,30 +197,20 @@ fn check_demonstrations(report: &mut CheckReport, file: &TaskFile, scope: CheckS
         let (Some(names), Some(steps)) = (report.take(names), report.take(steps)) else { continue };
         report.steps += steps;
         let mut check = DemoCheck { report, file, demo, steps };
-        let mut has_required_shapes = true;
-        for (name, row_shape) in REQUIRED_STREAMS {
-            let shape = match name {
-                // Says that recordings of earlier versions lack them.
-                JOINT_ACTIONS => file.joint_commands(demo).map(|joints| vec![joints.len(), ARM_DOFS]),
-                _ => file.shape(demo, name),
-            };
-            let shape = check.report.take(shape);
-            if shape.as_ref().is_some_and(|shape| shape.get(1..) == Some(row_shape)) {
-                continue;
-            }
-            has_required_shapes = false;
-            if let Some(shape) = shape {
-                let lengths = row_shape.iter().map(usize::to_string);
-                let expected: Vec<String> = std::iter::once("steps".to_owned()).chain(lengths).collect();
-                check.add(name, format!("expected the shape ({}), got {shape:?}", expected.join(", ")));
+        for spec in streams::all().iter().filter(|spec| spec.presence == Presence::Always) {
+            if !names.iter().any(|name| spec.is_at(name)) {
+                // Links are not listed.
+                check.report.take(file.shape(demo, spec.path));
             }
         }
-        let is_read = |name: &&String| scope == CheckScope::Whole || !is_image_stream(name);
-        names.iter().filter(is_read).for_each(|name| check.check_stream(name));
+        for name in &names {
+            let spec = streams::named(name);
+            if scope == CheckScope::Whole || !spec.as_ref().is_some_and(StreamSpec::is_rendered) {
+                check.check_stream(name, spec.as_ref());
+            }
+        }
         check.check_attributes();
-        if has_required_shapes {
-            check.check_relations();
-        }
+        check.check_rotations();
     }
     let (steps, demos) = (report.steps - steps_before, file.demos.len());
     for (name, count, unit) in [("total", steps, "step"), ("num_demos", demos, "demonstration")] {
@@ -327,72 +253,49 @@ impl DemoCheck<'_> {
         self.report.problems.push(self.file.error(self.demo, name, what).to_string());
     }
 
-    /// Checks that the numeric attributes of the demonstration are those of its record.
+    /// Checks that the attributes of the demonstration are those of its record, and that its length is.
     fn check_attributes(&mut self) {
-        let Some(record) = self.report.take(self.file.record(self.demo)) else { return };
-        let id = &record.header.id;
-        for (name, expected) in [
-            ("num_samples", self.steps as u64),
-            ("task_id", id.task as u64),
-            ("demo_id", self.demo as u64),
-            ("attempt", u64::from(id.episode)),
-            ("success", u64::from(record.verdict.safety)),
-        ] {
-            if self.file.contradicts(self.demo, name, expected) {
-                let source = if name == "num_samples" { "the actions" } else { "its record and place" };
-                let key = format!("/data/demo_{}, attribute {name}", self.demo);
-                self.report.add(&self.file.path, &key, format!("expected {expected}, by {source}"));
-            }
+        let (file, demo) = (self.file, self.demo);
+        let Some(record) = self.report.take(file.record(demo)) else { return };
+        for (name, what) in file.contradictions(demo, &record) {
+            self.report.add(&file.path, &format!("/data/demo_{demo}, attribute {name}"), what);
+        }
+        if record.stats.steps as usize != self.steps {
+            self.add("actions", format!("{} steps, metadata_json says {}", self.steps, record.stats.steps));
         }
     }
 
-    /// Checks the length of a stream, and that its values are finite.
-    fn check_stream(&mut self, name: &str) {
+    /// Checks length, type, shape and range of a stream. Reading it verifies its digest.
+    fn check_stream(&mut self, name: &str, spec: Option<&StreamSpec>) {
         let Some(stream) = self.report.take(self.file.stream(self.demo, name)) else { return };
         let width: usize = stream.row_shape.iter().product();
         let (count, steps) = (stream.values.len(), self.steps);
         if count != steps * width {
             self.add(name, format!("{} steps, the actions have {steps}", count / width.max(1)));
         }
-        let is_depth = DEPTH_STREAMS.iter().any(|depth| name == format!("obs/{depth}"));
-        let not_finite = match &stream.values {
-            StreamValues::F64(values) => values.iter().position(|x| !x.is_finite()),
+        if let Some(expected) = spec.and_then(|spec| declaration_mismatch(spec, &stream)) {
+            return self.add(name, expected);
+        }
+        let is_possible = |x: f64| match spec {
             // Depth is infinite in the background.
-            StreamValues::F32(values) if is_depth => {
-                let is_depth_m = |x: &f32| *x > 0.0 && (*x <= MAX_DEPTH_M || x.is_infinite());
-                values.iter().position(|x| !is_depth_m(x))
-            }
-            StreamValues::F32(values) => values.iter().position(|x| !x.is_finite()),
-            StreamValues::U8(_) => None,
+            Some(spec) if spec.row == RowShape::Depth => x > 0.0 && (x <= spec.bound || x.is_infinite()),
+            Some(spec) => x.is_finite() && x.abs() <= spec.bound,
+            None => x.is_finite(),
         };
-        if let Some(at) = not_finite {
-            let step = at / width.max(1);
-            let what = match is_depth {
-                true => format!(
-                    "step {step}: a depth that is neither infinite nor above 0 and up to {MAX_DEPTH_M} m"
-                ),
-                false => format!("step {step}: a number that is not finite"),
+        let has_quaternion = name.ends_with("_pose") || name.ends_with("/root_pose_w");
+        let numbers = stream.values.into_f64();
+        if let Some(at) = numbers.iter().position(|x| !is_possible(*x)) {
+            let (step, x) = (at / width.max(1), numbers[at]);
+            let bound = spec.map_or(f64::INFINITY, |spec| spec.bound);
+            let what = match x.is_finite() {
+                true => {
+                    format!("step {step}: {x}; expected at most {bound} in magnitude: is it in another unit?")
+                }
+                false => format!("step {step}: {x} is not a finite number"),
             };
             self.add(name, what);
-        }
-        if is_depth && (stream.row_shape.len() != 2 || !matches!(stream.values, StreamValues::F32(_))) {
-            let got = &stream.row_shape;
-            self.add(name, format!("expected float32 of shape (steps, height, width), got {got:?} per step"));
-        }
-        let is_image = IMAGE_STREAMS.iter().any(|image| name == format!("obs/{image}"));
-        if is_image {
-            if !matches!(stream.row_shape[..], [_, _, 3]) {
-                let got = &stream.row_shape;
-                self.add(name, format!("expected the shape (steps, height, width, 3), got {got:?} per step"));
-            }
-            self.check_pictures(name, &stream.values, width);
-        }
-        let is_pose = name.ends_with("/root_pose_w") || CAMERA_POSES.contains(&name);
-        if is_pose && width == 7 {
-            match &stream.values {
-                StreamValues::F64(poses) => self.check_quaternions(name, poses),
-                _ => self.add(name, "expected float64"),
-            }
+        } else if has_quaternion && width == 7 {
+            self.check_quaternions(name, &numbers);
         }
     }
 
@@ -405,6 +308,26 @@ impl DemoCheck<'_> {
         if let Some(step) = bad {
             let q = &poses[7 * step + 3..7 * step + 7];
             self.add(name, format!("step {step}: not a unit quaternion w x y z with w >= 0: {q:?}"));
+        }
+    }
+
+    /// Checks the rotation vectors of actions and states, and that the quaternions of the tool are the same rotations.
+    fn check_rotations(&mut self) {
+        let rows = |name: &str| match self.file.array(self.demo, name) {
+            Ok(array) if array.width() == 7 => array.values,
+            _ => Vec::new(),
+        };
+        let (actions, states, poses) = (rows("actions"), rows("obs/state"), rows("obs/eef_pose"));
+        self.check_rotation_vectors("obs/state", &states);
+        self.check_rotation_vectors("actions", &actions);
+        let differs = poses.chunks_exact(7).zip(states.chunks_exact(7)).position(|(pose, state)| {
+            let q = Quat::new_unchecked(nalgebra::Quaternion::new(pose[3], pose[4], pose[5], pose[6]));
+            let other = rotation::from_axis_angle(&Vec3::from_column_slice(&state[3..6]));
+            (q.coords - other.coords).norm().min((q.coords + other.coords).norm()) > TOLERANCE
+        });
+        if let Some(step) = differs {
+            let what = "the quaternion is not the rotation of obs/state: is its order w x y z?";
+            self.add("obs/eef_pose", format!("step {step}: {what}"));
         }
     }
 
@@ -426,148 +349,21 @@ impl DemoCheck<'_> {
             self.add(name, what);
         }
     }
+}
 
-    /// Checks that commanded joint positions are within the limits of the joints, and lead to the pose of the action
-    /// where they are the action.
-    fn check_joint_actions(&mut self) {
-        let Some(joints) = self.report.take(self.file.joint_commands(self.demo)) else { return };
-        let beyond =
-            joints.iter().enumerate().find_map(|(step, row)| Some((step, joint_beyond_limits(row)?)));
-        if let Some((step, joint)) = beyond {
-            let q = joints[step][joint];
-            let what = format!("step {step}: joint {} at {q} rad is outside of its limits", joint + 1);
-            return self.add(JOINT_ACTIONS, what);
-        }
-        let Some(actions) = self.report.take(self.file.actions(self.demo)) else { return };
-        let mut differs = actions.iter().map(|action| {
-            let reached = action.joints.map(|joints| panda::tool_pose(&joints).translation.vector);
-            reached.is_some_and(|reached| (reached - action.position_b).norm() > TOLERANCE)
-        });
-        if let Some(step) = differs.position(|differs| differs) {
-            self.add(
-                JOINT_ACTIONS,
-                format!("step {step}: not the joint positions at the pose of the action"),
-            );
-        }
-        self.check_joint_targets(&joints, &actions);
+/// Type and shape that a stream should have, if it has others.
+fn declaration_mismatch(spec: &StreamSpec, stream: &DataStream) -> Option<String> {
+    let (expected, got) = (spec.row_shape(), &stream.row_shape);
+    let fits = expected.len() == got.len()
+        && expected.iter().zip(got).all(|(expected, got)| expected.is_none_or(|expected| expected == *got));
+    if fits && stream.values.number_type() == spec.number_type {
+        return None;
     }
-
-    /// Checks that commanded joint positions lead near the commanded poses. They are one step of inverse kinematics,
-    /// which differs by millimetres in motions of 20 mm per control step, by the square of that in faster ones, and by
-    /// more where a pose is out of reach.
-    fn check_joint_targets(&mut self, joints: &[ArmAngles], actions: &[Action]) {
-        let Some(record) = self.report.take(self.file.record(self.demo)) else { return };
-        if record.stats.far_commands > 0 {
-            return;
-        }
-        let reached: Vec<Vec3> = joints.iter().map(|row| panda::tool_pose(row).translation.vector).collect();
-        let typical_error = |first: usize, first_action: usize| {
-            let pairs = reached.iter().skip(first).zip(actions.iter().skip(first_action));
-            let mut errors: Vec<f64> =
-                pairs.map(|(place, action)| (place - action.position_b).norm()).collect();
-            errors.sort_by(f64::total_cmp);
-            errors.get(errors.len() / 2).copied().unwrap_or(0.0)
-        };
-        let own = typical_error(0, 0);
-        if own > MAX_JOINT_TARGET_ERROR_M {
-            let what = format!("{:.1} mm from the poses of the actions in half of the steps", 1e3 * own);
-            return self.add(JOINT_ACTIONS, what);
-        }
-        let neighbour = typical_error(1, 0).min(typical_error(0, 1));
-        if own > MIN_SHIFT_ERROR_M && neighbour < 0.25 * own {
-            self.add(JOINT_ACTIONS, "they are one control step earlier or later than the actions");
-        }
-    }
-
-    /// Checks that the arm's drives hold it: they are never without torque after the first action.
-    fn check_joint_torques(&mut self) {
-        if !self.file.has(self.demo, JOINT_TORQUES) {
-            return;
-        }
-        let Some(torques) = self.report.take(self.file.array(self.demo, JOINT_TORQUES)) else { return };
-        let mut rows = torques.values.chunks_exact(ARM_DOFS).skip(1);
-        if let Some(after_first) = rows.position(|row| row.iter().all(|torque| *torque == 0.0)) {
-            let what = format!("step {}: no torque, which lets the arm fall", after_first + 1);
-            self.add(JOINT_TORQUES, what);
-        }
-    }
-
-    /// Checks the actions in a grip code against the closures.
-    fn check_grip_labels(&mut self, code: GripCode, actions: &[f64], binary: &[f64]) {
-        let name = actions_stream_name(code);
-        let Some(labels) = self.report.take(self.file.array(self.demo, name)) else { return };
-        let labels = labels.values;
-        if labels.len() != actions.len() {
-            return self.add(name, format!("{} numbers, expected {}", labels.len(), actions.len()));
-        }
-        let rows = labels.chunks_exact(7).zip(actions.chunks_exact(7)).zip(binary.chunks_exact(7));
-        let is_label = |label: f64, is_closed: bool| match code {
-            GripCode::Force if is_closed => label >= 0.0 && label.is_finite(),
-            GripCode::Force => label == OPEN_FORCE,
-            _ => (0.0..=1.0).contains(&label) && (is_closed || label == 0.0),
-        };
-        let is_closed: Vec<bool> = binary.as_chunks::<7>().0.iter().map(|row| row[6] > 0.5).collect();
-        let closures: Vec<f64> = actions.as_chunks::<7>().0.iter().map(|row| row[6]).collect();
-        let is_other_width = |(label, expected): (&[f64; 7], f64)| (label[6] - expected).abs() > TOLERANCE;
-        let mut widths = labels.as_chunks::<7>().0.iter().zip(grip_labels::two_widths(&closures, &is_closed));
-        let mut bad =
-            rows.map(|((row, action), binary)| row[..6] != action[..6] || !is_label(row[6], binary[6] > 0.5));
-        if let Some(step) = bad.position(|is_bad| is_bad) {
-            self.add(name, format!("step {step}: not the actions in the grip code {}", code.name()));
-        } else if code == GripCode::TwoWidth
-            && let Some(step) = widths.position(is_other_width)
-        {
-            let what = "not 0 while open, and the median commanded closure while closed";
-            self.add(name, format!("step {step}: {what}"));
-        }
-    }
-
-    /// Checks relations between streams.
-    fn check_relations(&mut self) {
-        let (file, demo) = (self.file, self.demo);
-        let mut get =
-            |name: &str| self.report.take(file.array(demo, name)).map_or(Vec::new(), |array| array.values);
-        let (poses, states, times) = (get("obs/eef_pose"), get("obs/state"), get("timestamps"));
-        let (actions, binary) = (get("actions"), get("actions_binary"));
-        self.check_quaternions("obs/eef_pose", &poses);
-        let differs = poses.chunks_exact(7).zip(states.chunks_exact(7)).position(|(pose, state)| {
-            let q = Quat::new_unchecked(nalgebra::Quaternion::new(pose[3], pose[4], pose[5], pose[6]));
-            let other = rotation::from_axis_angle(&Vec3::new(state[3], state[4], state[5]));
-            (q.coords - other.coords).norm().min((q.coords + other.coords).norm()) > TOLERANCE
-        });
-        if let Some(step) = differs {
-            let what = format!(
-                "step {step}: the quaternion is not the rotation of obs/state: is its order w x y z?"
-            );
-            self.add("obs/eef_pose", what);
-        }
-        let same_place = |(pose, state): (&[f64], &[f64])| {
-            (0..3).all(|axis| (pose[axis] - state[axis]).abs() <= TOLERANCE)
-        };
-        let mut places = poses.chunks_exact(7).zip(states.chunks_exact(7));
-        if let Some(step) = places.position(|pair| !same_place(pair)) {
-            self.add("obs/state", format!("step {step}: not the position of obs/eef_pose: is it in m?"));
-        }
-        let expected = |step: usize| step as f64 * CONTROL_DT;
-        let is_late = |(step, t): (usize, &f64)| (t - expected(step)).abs() > TOLERANCE;
-        if let Some(step) = times.iter().enumerate().position(is_late) {
-            let (time, expected) = (times[step], expected(step));
-            self.add("timestamps", format!("step {step}: {time} s, expected {expected} at {CONTROL_HZ} Hz"));
-        }
-        self.check_rotation_vectors("obs/state", &states);
-        self.check_rotation_vectors("actions", &actions);
-        let is_binary_of = |(a, b): (&[f64], &[f64])| a[..6] == b[..6] && [0.0, 1.0].contains(&b[6]);
-        let mut both = actions.chunks_exact(7).zip(binary.chunks_exact(7));
-        if let Some(step) = both.position(|pair| !is_binary_of(pair)) {
-            self.add("actions_binary", format!("step {step}: not the actions with a gripper of 0 or 1"));
-        }
-        self.check_readings();
-        self.check_joint_actions();
-        self.check_joint_torques();
-        for code in [GripCode::TwoWidth, GripCode::Force] {
-            self.check_grip_labels(code, &actions, &binary);
-        }
-    }
+    let (expected, number_type) = (spec.shape_text(), spec.number_type.name());
+    Some(format!(
+        "expected {number_type} of shape {expected}, got {} with {got:?} per step",
+        stream.values.number_type().name()
+    ))
 }
 
 #[cfg(test)]

@@ -6,90 +6,97 @@ use rust_hdf5::{H5File, Selection};
 use serde_json::json;
 
 use super::*;
-use crate::{DataStream, Demonstration, hdf5::write_file, merge_parts};
-
-use softvt_policy::Action;
-use softvt_sensing::tactile::Markers;
+use crate::{
+    Demonstration, StreamValues,
+    hdf5::write_file,
+    merge_parts,
+    streams::{COMMANDED_ROTATIONS, actions_in},
+};
+use softvt_policy::{Action, NumberType, profile::GripCode};
+use softvt_robot::panda;
 
 const STEPS: usize = 9;
+
+fn stream(name: &str, number_type: NumberType, row_shape: &[usize], numbers: Vec<f64>) -> DataStream {
+    let (values, row_shape) = (StreamValues::new(number_type, numbers), row_shape.to_vec());
+    DataStream { name: name.to_owned(), row_shape, values, attributes: Vec::new() }
+}
 
 /// A demonstration whose tool turns while it rises.
 fn demonstration(salt: f64) -> Demonstration {
     let posture = |step: usize| [0.0, -0.5, 0.0, -2.0, 0.0, 1.6, 0.8].map(|q| q + 0.01 * step as f64 + salt);
-    let place = |step: usize| panda::tool_pose(&posture(step)).translation.vector;
-    let turns = (0..STEPS).map(|step| rotation::axis_angle(&panda::tool_pose(&posture(step)).rotation));
-    let turns: Vec<Vec3> = rotation::continuous(turns).collect();
-    let turn = |step: usize| turns[step];
-    let q = |step: usize| rotation::from_axis_angle(&turn(step));
-    let each = |row: &dyn Fn(usize) -> Vec<f64>| (0..STEPS).flat_map(row).collect::<Vec<f64>>();
-    let state = |step: usize| {
-        let (p, r) = (place(step), turn(step));
-        vec![p.x, p.y, p.z, r.x, r.y, r.z, 0.03]
+    let pose = |step: usize| panda::tool_pose(&posture(step));
+    let turns: Vec<Vec3> =
+        rotation::continuous((0..STEPS).map(|step| rotation::axis_angle(&pose(step).rotation))).collect();
+    let row = |step: usize, last: f64| {
+        let (p, r) = (pose(step).translation.vector, turns[step]);
+        vec![p.x, p.y, p.z, r.x, r.y, r.z, last]
     };
-    let pose = |step: usize| {
-        let (p, q) = (place(step), q(step));
-        vec![p.x, p.y, p.z, q.w, q.i, q.j, q.k]
+    let numbers = |spec: &StreamSpec, step: usize| -> Vec<f64> {
+        match spec.path {
+            "obs/eef_pose" => softvt_policy::pose_row(&pose(step)).to_vec(),
+            "obs/state" => row(step, 0.03),
+            "obs/arm_joint_pos" | "actions_joints" => posture(step).to_vec(),
+            path if path.starts_with("actions") => row(step, 0.0),
+            _ => vec![0.0; spec.row_shape().into_iter().flatten().product()],
+        }
     };
-    let constant = |name: &str, row: &[usize], value: f64| {
-        DataStream::f64(name, row, vec![value; STEPS * row.iter().product::<usize>()]).unit("m", "")
+    let of = |spec: &StreamSpec| {
+        let row_shape: Vec<usize> = spec.row_shape().into_iter().flatten().collect();
+        let numbers = (0..STEPS).flat_map(|step| numbers(spec, step)).collect();
+        stream(spec.path, spec.number_type, &row_shape, numbers)
     };
-    let spread: [[f32; 2]; MARKER_COUNT] = std::array::from_fn(|marker| [1.5 + marker as f32, 1.5]);
-    let mut demonstration = Demonstration {
-        record: serde_json::from_str(include_str!("../../../tests/data/episode_record.json"))
-            .expect("a valid record"),
-        actions: (0..STEPS).map(|step| Action::new(place(step), turn(step), 0.3)).collect(),
-        joint_commands: (0..STEPS).map(posture).collect(),
-        gripper_closed: (0..STEPS).map(|step| step > 4).collect(),
-        grip_labels_n: (0..STEPS).map(|step| if step > 4 { 2.5 } else { -1.0 }).collect(),
-        observed: vec![
-            DataStream::f64("obs/eef_pose", &[7], each(&pose)),
-            DataStream::f64("obs/state", &[7], each(&state)),
-            DataStream::f64("obs/arm_joint_pos", &[7], each(&|step| posture(step).to_vec())),
-            constant("obs/gripper_pos", &[2], 0.03),
-            constant("obs/gripper_width", &[1], 0.06),
-            constant("obs/gripper_width_sensed", &[1], 0.0592),
-            constant("obs/gripper_close_norm", &[1], 0.25),
-            DataStream::f64(
-                "obs/gripper_closure",
-                &[1],
-                each(&|step| vec![if step == 0 { 0.0 } else { 0.3 }]),
-            ),
-        ],
-        privileged: vec![
-            DataStream::f32("privileged/states/deformable_object/bun/nodal_pos_w", &[70_000, 3], {
-                (0..STEPS * 210_000).map(|i| (i as f32 * 1e-4).sin()).collect()
-            }),
-            DataStream::u8("privileged/contact", &[2], vec![1; 2 * STEPS]).attribute("meaning", "touching"),
-        ],
-    };
-    demonstration.set_markers(&[[Markers { initial: spread, current: spread }; 2]; STEPS]);
-    demonstration
+    let required = streams::all().into_iter().filter(|spec| spec.presence == Presence::Always);
+    let nodes = (0..STEPS * 210_000).map(|i| (i as f64 * 1e-4).sin()).collect();
+    let nodes =
+        stream("privileged/states/deformable_object/bun/nodal_pos_w", NumberType::F32, &[70_000, 3], nodes);
+    let mut contact = stream("privileged/contact", NumberType::U8, &[2], vec![1.0; 2 * STEPS]);
+    contact.attributes.push(("meaning".to_owned(), "touching".to_owned()));
+    let mut record: softvt_runs::record::EpisodeRecord =
+        serde_json::from_str(include_str!("../../../tests/data/episode_record.json"))
+            .expect("a valid record");
+    record.stats.steps = STEPS as u32;
+    Demonstration { record, streams: required.map(|spec| of(&spec)).chain([nodes, contact]).collect() }
 }
 
-fn write(demonstration: &Demonstration, name: &str) -> (tempfile::TempDir, PathBuf) {
+fn write_as(
+    demonstration: &Demonstration,
+    name: &str,
+    environment: &Value,
+    [total, demos]: [usize; 2],
+) -> (tempfile::TempDir, PathBuf) {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join(name);
-    write_file(&path, &json!({ "env_name": "softvt" }), STEPS, 1, |writer| {
-        writer.write_attributes(0, &demonstration.record, STEPS)?;
-        writer.write_streams(0, demonstration)
+    write_file(&path, environment, total, demos, |writer| {
+        writer.write_attributes(0, &demonstration.record)?;
+        demonstration.streams.iter().try_for_each(|stream| writer.write_stream(0, STEPS, stream))
     })
     .unwrap();
     (folder, path)
 }
 
-/// The problems of a file whose streams `change` has damaged.
+fn write(demonstration: &Demonstration, name: &str) -> (tempfile::TempDir, PathBuf) {
+    write_as(demonstration, name, &json!({ "env_name": "softvt" }), [STEPS, 1])
+}
+
+/// The stream of a name.
+fn named<'a>(streams: &'a mut [DataStream], name: &str) -> &'a mut DataStream {
+    streams.iter_mut().find(|stream| stream.name == name).expect("a stream")
+}
+
+fn numbers<'a>(streams: &'a mut [DataStream], name: &str) -> &'a mut Vec<f64> {
+    let StreamValues::F64(numbers) = &mut named(streams, name).values else { panic!("{name} is of doubles") };
+    numbers
+}
+
+/// The problems of a file whose streams `change` has damaged before they were written.
 fn problems(change: impl Fn(&mut Vec<DataStream>)) -> String {
     let mut demonstration = demonstration(0.0);
-    change(&mut demonstration.observed);
+    change(&mut demonstration.streams);
     let (_folder, path) = write(&demonstration, "task.hdf5");
     let found = file(&path).unwrap().problems;
     assert!(found.iter().all(|line| line.contains("task.hdf5: /data/demo_0/")), "{found:?}");
     found.join("\n")
-}
-
-fn numbers(stream: &mut DataStream) -> &mut Vec<f64> {
-    let StreamValues::F64(numbers) = &mut stream.values else { panic!("{} is of doubles", stream.name) };
-    numbers
 }
 
 #[test]
@@ -102,23 +109,12 @@ fn demonstrations_read_from_a_merged_file_are_identical() {
     merge_parts(&parts.each_ref().map(|(_, path)| path.clone()), &path, &environment).unwrap();
     let read = TaskFile::open(&path).unwrap();
     assert_eq!((&read.demos[..], read.environment().unwrap()), (&[0, 1][..], environment));
-    for (demo, demonstration) in both.iter().enumerate() {
-        let mut back = read.read(demo).unwrap();
-        let order = |streams: &mut Vec<DataStream>| {
-            streams.sort_by(|a, b| a.name.cmp(&b.name));
-            streams.iter_mut().for_each(|stream| stream.attributes.sort());
+    for (demo, demonstration) in both.into_iter().enumerate() {
+        let in_order = |mut demonstration: Demonstration| {
+            demonstration.streams.sort_by(|a, b| a.name.cmp(&b.name));
+            demonstration
         };
-        let mut demonstration = demonstration.clone();
-        for streams in [
-            &mut back.observed,
-            &mut back.privileged,
-            &mut demonstration.observed,
-            &mut demonstration.privileged,
-        ] {
-            order(streams);
-        }
-        assert_eq!(back, demonstration);
-        assert_eq!(read.actions(demo).unwrap(), demonstration.actions);
+        assert_eq!(in_order(read.read(demo).unwrap()), in_order(demonstration));
     }
     assert!(read.actions(2).unwrap_err().to_string().contains("there is no demo_2; there are 2"));
     let report = file(&path).unwrap();
@@ -129,13 +125,61 @@ fn demonstrations_read_from_a_merged_file_are_identical() {
 #[test]
 fn problems_of_a_stream_name_its_file_and_key() {
     assert_eq!(problems(|_| ()), "");
-    let missing = problems(|streams| drop(streams.remove(2)));
-    assert!(missing.contains("/data/demo_0/obs/arm_joint_pos: it is missing"), "{missing}");
-    let bare = problems(|streams| numbers(&mut streams[3])[5] = f64::NAN);
-    assert!(bare.contains("obs/gripper_pos: step 2: a number that is not finite"), "{bare}");
-    let shape =
-        problems(|streams| streams[2] = DataStream::f64("obs/arm_joint_pos", &[6], vec![0.0; 6 * STEPS]));
-    assert!(shape.contains("obs/arm_joint_pos: expected the shape (steps, 7), got [9, 6]"), "{shape}");
+    let joints = "obs/arm_joint_pos";
+    let replaced = |number_type, row: &[usize]| {
+        problems(|streams| {
+            let zeros = vec![0.0; STEPS * row.iter().product::<usize>()];
+            *named(streams, joints) = stream(joints, number_type, row, zeros);
+        })
+    };
+    let scaled = |name: &str, factor: f64| {
+        problems(|streams| numbers(streams, name).iter_mut().for_each(|number| *number *= factor))
+    };
+    for (found, words) in [
+        (
+            problems(|streams| streams.retain(|stream| stream.name != joints)),
+            "obs/arm_joint_pos: it is missing",
+        ),
+        (
+            problems(|streams| numbers(streams, "obs/gripper_pos")[5] = f64::NAN),
+            "obs/gripper_pos: step 2: NaN is not a finite number",
+        ),
+        (
+            replaced(NumberType::F64, &[6]),
+            "arm_joint_pos: expected float64 of shape (T, 7), got float64 with [6]",
+        ),
+        (replaced(NumberType::F32, &[7]), "arm_joint_pos: expected float64 of shape (T, 7), got float32"),
+        (scaled(joints, 180.0 / PI), "arm_joint_pos: step 0: -28.64"),
+        (scaled("obs/state", 1e3), "obs/state: step 0: "),
+    ] {
+        assert!(found.contains(words), "{words}: {found}");
+    }
+    let depth = |metres: f64| {
+        problems(|streams| {
+            streams.push(stream("obs/agentview_depth", NumberType::F32, &[2, 2], vec![metres; 4 * STEPS]));
+        })
+    };
+    assert_eq!(depth(f64::INFINITY), "");
+    assert!(depth(900.0).contains("obs/agentview_depth: step 0: 900; expected at most 100 in magnitude"));
+}
+
+#[test]
+fn a_stream_that_was_changed_after_the_recording_is_reported() {
+    let rewritten = |digest: Option<&str>| {
+        changed(|file| {
+            file.delete_dataset("data/demo_0/rewards").unwrap();
+            let made = demo_0(file).new_dataset::<f64>().shape([STEPS]).create("rewards").unwrap();
+            made.write_raw(&[0.25; STEPS]).unwrap();
+            for digest in digest {
+                let attribute = made.new_attr::<rust_hdf5::VarLenUnicode>().shape(()).create("sha256");
+                attribute.unwrap().write_string(digest).unwrap();
+            }
+        })
+    };
+    let found = rewritten(Some(&StreamValues::F64(vec![0.0; STEPS]).sha256()));
+    assert!(found.contains("/data/demo_0/rewards: it was changed after the recording"), "{found}");
+    assert_eq!(rewritten(Some(&StreamValues::F64(vec![0.25; STEPS]).sha256())), "");
+    assert_eq!(rewritten(None), "", "a stream that another program has written anew has no digest");
 }
 
 /// The same rotation by the vector that is a full turn away.
@@ -144,23 +188,17 @@ fn opposite(vector: Vec3) -> Vec3 {
 }
 
 #[test]
-fn commands_that_change_sign_at_half_a_turn_are_written_continuously_and_read_bit_for_bit() {
+fn commanded_rotations_take_the_place_of_continuous_ones() {
     let mut demonstration = demonstration(0.0);
-    let states = demonstration.actions.clone();
-    for action in demonstration.actions.iter_mut().step_by(2) {
-        action.axis_angle_b = opposite(action.axis_angle_b);
-    }
+    let rows = numbers(&mut demonstration.streams, actions_in(GripCode::Continuous)).clone();
+    let commanded: Vec<Vec3> =
+        rows.as_chunks::<7>().0.iter().map(|row| opposite(Vec3::from_column_slice(&row[3..6]))).collect();
+    let vectors = commanded.iter().flat_map(|vector| <[f64; 3]>::from(*vector)).collect();
+    demonstration.streams.push(stream(COMMANDED_ROTATIONS, NumberType::F64, &[3], vectors));
     let (_folder, path) = write(&demonstration, "task.hdf5");
-    let read = TaskFile::open(&path).unwrap();
-    assert_eq!(read.actions(0).unwrap(), demonstration.actions);
-    for code in GripCode::ALL {
-        let rows = read.array(0, actions_stream_name(code)).unwrap().values;
-        for (row, action) in rows.as_chunks::<7>().0.iter().zip(&states) {
-            assert!(
-                (Action::from_array(*row).axis_angle_b - action.axis_angle_b).norm() < 1e-12,
-                "{code:?}: {row:?}"
-            );
-        }
+    let actions = TaskFile::open(&path).unwrap().actions(0).unwrap();
+    for ((action, row), vector) in actions.iter().zip(rows.as_chunks::<7>().0).zip(&commanded) {
+        assert_eq!(*action, Action { axis_angle_b: *vector, ..Action::from_array(*row) });
     }
     assert_eq!(file(&path).unwrap().problems, [""; 0]);
 }
@@ -174,7 +212,7 @@ fn rotation_vectors_that_change_sign_are_counted() {
         (0..STEPS, "obs/state: 1 jump of the rotation vector"),
     ] {
         let text = problems(|streams| {
-            for row in &mut numbers(&mut streams[1]).as_chunks_mut::<7>().0[rows.clone()] {
+            for row in &mut numbers(streams, "obs/state").as_chunks_mut::<7>().0[rows.clone()] {
                 let other = opposite(Vec3::from_column_slice(&row[3..6]));
                 row[3..6].copy_from_slice(other.as_slice());
             }
@@ -184,70 +222,10 @@ fn rotation_vectors_that_change_sign_are_counted() {
 }
 
 #[test]
-fn readings_in_other_units_or_without_content_are_reported() {
-    let scaled = |at: usize, factor: f64| {
-        problems(|streams| numbers(&mut streams[at]).iter_mut().for_each(|value| *value *= factor))
-    };
-    for (at, factor, words) in [
-        (2, 180.0 / std::f64::consts::PI, "obs/arm_joint_pos: step 0: beyond the limits of the joints"),
-        (2, 0.9, "obs/arm_joint_pos: step 0: not the joint positions at obs/eef_pose"),
-        (3, 1e3, "obs/gripper_pos: step 0: expected positions of the fingers in 0..0.04 m"),
-        (4, 1e3, "obs/gripper_width: step 0: not the sum of obs/gripper_pos"),
-        (5, 1e3, "obs/gripper_width_sensed: step 0: not near obs/gripper_width"),
-        (5, 0.0, "obs/gripper_width_sensed: step 0: not near obs/gripper_width"),
-        (6, 100.0, "obs/gripper_close_norm: step 0: not 1 - width / 0.08 m"),
-        (7, 255.0, "obs/gripper_closure: step 1: expected a closure in 0..1"),
-        (7, 0.5, "obs/gripper_closure: step 1: not the closure that the action before commands"),
-    ] {
-        let text = scaled(at, factor);
-        assert!(text.contains(words), "{words}: {text}");
-    }
-    let picture = |step: usize| if step == 4 { [7; 12] } else { std::array::from_fn(|i| i as u8) };
-    let text = problems(|streams| {
-        let pixels = (0..STEPS).flat_map(picture).collect();
-        streams.push(DataStream::u8("obs/agentview_rgb", &[2, 2, 3], pixels));
-        numbers(&mut streams[1]).chunks_exact_mut(7).for_each(|row| row[6] = 0.06);
-        let markers = streams.iter_mut().find(|stream| stream.name == "obs/gripper_marker_motion");
-        let StreamValues::F32(markers) = &mut markers.expect("markers").values else { panic!("float32") };
-        markers[8 * MARKER_COUNT..].fill(0.0);
-    });
-    for words in [
-        "obs/agentview_rgb: step 4: a picture of one colour",
-        "obs/state: step 0: its last number is not half of obs/gripper_width",
-        "obs/gripper_marker_motion: step 1: all markers of a finger are at one place",
-    ] {
-        assert!(text.contains(words), "{words}: {text}");
-    }
-}
-
-#[test]
-fn cameras_that_move_or_have_another_matrix_are_reported() {
-    let camera = |places: &dyn Fn(usize) -> f64, matrix: &str| {
-        problems(|streams| {
-            let rows = (0..STEPS).flat_map(|step| [places(step), 0.0, 0.5, 1.0, 0.0, 0.0, 0.0]).collect();
-            let poses = DataStream::f64("obs/agentview_pose", &[7], rows);
-            streams.push(poses.attribute("intrinsic", matrix));
-            let pixels = (0..STEPS * 24).map(|at| at as u8).collect();
-            streams.push(DataStream::u8("obs/agentview_rgb", &[2, 4, 3], pixels));
-        })
-    };
-    let matrix = "[[3.0, 0.0, 2.0], [0.0, 3.0, 1.0], [0.0, 0.0, 1.0]]";
-    assert_eq!(camera(&|_| 1.0, matrix), "");
-    let moving = camera(&|step| 0.1 * step as f64, matrix);
-    assert!(moving.contains("obs/agentview_pose: step 1: the camera moves"), "{moving}");
-    for wrong in
-        ["[[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]", "none", &matrix.replace("1.0]", "2.0]")]
-    {
-        let text = camera(&|_| 1.0, wrong);
-        assert!(text.contains("obs/agentview_pose: attribute intrinsic: expected one focal"), "{text}");
-    }
-}
-
-#[test]
 fn attributes_that_differ_from_the_record_are_reported() {
     for name in ["num_samples", "task_id", "demo_id", "attempt", "success"] {
         let text = changed(|file| demo_0(file).set_attr_numeric(name, &77_i64).unwrap());
-        assert!(text.contains(&format!("/data/demo_0, attribute {name}: expected ")), "{name}: {text}");
+        assert!(text.contains(&format!("/data/demo_0, attribute {name}: not ")), "{name}: {text}");
     }
     let rate = changed(|file| {
         file.root_group().group("data").unwrap().set_attr_numeric("fps", &10_i64).unwrap();
@@ -256,136 +234,15 @@ fn attributes_that_differ_from_the_record_are_reported() {
 }
 
 #[test]
-fn joint_positions_and_widths_of_other_actions_are_reported() {
-    let with = |change: &dyn Fn(&mut Demonstration)| {
-        let mut demonstration = demonstration(0.0);
-        change(&mut demonstration);
-        let (_folder, path) = write(&demonstration, "task.hdf5");
-        file(&path).unwrap().problems.join("\n")
-    };
-    let turned = with(&|demonstration| {
-        demonstration.joint_commands.iter_mut().flatten().for_each(|joint| *joint += 0.05);
-    });
-    assert!(
-        turned.contains("actions_joints: ") && turned.contains("mm from the poses of the actions"),
-        "{turned}"
-    );
-    let late = with(&|demonstration| demonstration.joint_commands.rotate_right(1));
-    assert!(late.contains("actions_joints: they are one control step earlier or later"), "{late}");
-    let name = "data/demo_0/actions_two_width";
-    let (_folder, path) = write(&demonstration(0.0), "task.hdf5");
-    let mut rows = H5File::open(&path).unwrap().dataset(name).unwrap().read_raw::<f64>().unwrap();
-    rows.chunks_exact_mut(7).for_each(|row| row[6] *= 0.5);
-    let narrow = changed(|file| {
-        file.delete_dataset(name).unwrap();
-        let made = demo_0(file).new_dataset::<f64>().shape([STEPS, 7]).create("actions_two_width");
-        made.unwrap().write_raw(&rows).unwrap();
-    });
-    assert!(narrow.contains("actions_two_width: step 5: not 0 while open, and the median"), "{narrow}");
-}
-
-#[test]
-fn markers_outside_of_the_picture_or_exchanged_are_reported() {
-    let markers = |change: &dyn Fn(&mut [f32])| {
-        problems(|streams| {
-            let markers = streams.iter_mut().find(|stream| stream.name == "obs/gripper_marker_motion");
-            let StreamValues::F32(markers) = &mut markers.expect("markers").values else { panic!("float32") };
-            change(markers);
-        })
-    };
-    let far = markers(&|all| all.iter_mut().for_each(|at| *at *= 10.0));
-    assert!(far.contains("step 0: a marker outside of the tactile picture"), "{far}");
-    let moved = markers(&|all| all[8 * MARKER_COUNT] += 1.0);
-    assert!(moved.contains("step 1: initial positions of markers that are not those"), "{moved}");
-}
-
-#[test]
-fn forces_of_an_open_hand_have_the_value_of_their_code() {
-    let mut scaled = demonstration(0.0);
-    scaled.grip_labels_n.iter_mut().for_each(|label| *label *= 10.0);
-    let (_folder, path) = write(&scaled, "task.hdf5");
-    let found = file(&path).unwrap().problems;
-    assert!(found[0].contains("actions_force: step 0: not the actions in the grip code force"), "{found:?}");
-}
-
-#[test]
-fn true_states_that_contradict_each_other_are_reported() {
-    let mut wrong = demonstration(0.0);
-    wrong.privileged.push(DataStream::f64("privileged/pad_force", &[2], vec![0.0; 2 * STEPS]));
-    wrong.privileged.push(DataStream::f64("privileged/d", &[], vec![0.2; STEPS]));
-    wrong.privileged.push(DataStream::f64("privileged/d_max", &[], vec![0.1; STEPS]));
-    wrong.privileged.push(DataStream::f64("privileged/gripper_net_force", &[2, 3], vec![0.0; 6 * STEPS]));
-    wrong.privileged.push(DataStream::f64("privileged/actions_with_force", &[13], vec![0.0; 13 * STEPS]));
-    let pose = [500.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0].repeat(STEPS);
-    wrong.privileged.push(DataStream::f64("privileged/states/rigid_object/can/root_pose_w", &[7], pose));
-    let StreamValues::F32(nodes) = &mut wrong.privileged[0].values else { panic!("float32") };
-    nodes[210_000..420_000].fill(0.0);
-    let (_folder, path) = write(&wrong, "task.hdf5");
-    let text = file(&path).unwrap().problems.join("\n");
-    for words in [
-        "privileged/contact: step 0: not where privileged/pad_force is above 0",
-        "privileged/d: step 0: expected 0 or more and at most privileged/d_max",
-        "privileged/actions_with_force: step 0: not the action and privileged/gripper_net_force",
-        "can/root_pose_w: step 0: a place more than 20 m away",
-        "bun/nodal_pos_w: step 1: all nodes are at one place",
-    ] {
-        assert!(text.contains(words), "{words}: {text}");
-    }
-    let ends = changed(|file| {
-        file.delete_dataset("data/demo_0/rewards").unwrap();
-        demo_0(file)
-            .new_dataset::<f64>()
-            .shape([STEPS])
-            .create("rewards")
-            .unwrap()
-            .write_raw(&[0.0; STEPS])
-            .unwrap();
-    });
-    assert!(ends.contains("rewards: step 8: expected 1 in the last step and 0 before"), "{ends}");
-}
-
-#[test]
-fn joint_positions_torques_and_depths_in_other_units_are_reported() {
-    let text = problems(|streams| {
-        streams.push(DataStream::f64("obs/joint_torques", &[7], vec![0.0; 7 * STEPS]));
-        streams.push(DataStream::f32("obs/agentview_depth", &[2, 2], vec![900.0; 4 * STEPS]));
-    });
-    for words in
-        ["obs/joint_torques: step 1: no torque", "obs/agentview_depth: step 0: a depth that is neither"]
-    {
-        assert!(text.contains(words), "{text}");
-    }
-    let mut in_degrees = demonstration(0.0);
-    in_degrees.joint_commands[3] = in_degrees.joint_commands[3].map(f64::to_degrees);
-    let (_folder, path) = write(&in_degrees, "task.hdf5");
-    let text = file(&path).unwrap().problems.join("\n");
-    assert!(
-        text.contains("actions_joints: step 3: joint 1 at")
-            || text.contains("actions_joints: step 3: joint 2 at"),
-        "{text}"
-    );
-    let mut elsewhere = demonstration(0.0);
-    elsewhere.actions[2].joints = Some(elsewhere.joint_commands[2]);
-    elsewhere.actions[2].position_b.x += 0.01;
-    let (_folder, path) = write(&elsewhere, "task.hdf5");
-    let text = file(&path).unwrap().problems.join("\n");
-    assert!(
-        text.contains("actions_joints: step 2: not the joint positions at the pose of the action"),
-        "{text}"
-    );
-}
-
-#[test]
 fn quaternions_of_another_order_or_sign_are_distinguished() {
     let turned = problems(|streams| {
-        numbers(&mut streams[0]).chunks_exact_mut(7).for_each(|row| row[3..].rotate_left(1));
+        numbers(streams, "obs/eef_pose").chunks_exact_mut(7).for_each(|row| row[3..].rotate_left(1));
     });
     assert!(turned.contains("obs/eef_pose: step 0"), "{turned}");
     assert!(turned.contains("is its order w x y z?"), "{turned}");
     let signed = problems(|streams| {
-        numbers(&mut streams[0])
-            .chunks_exact_mut(7)
-            .for_each(|row| row[3..].iter_mut().for_each(|x| *x = -*x));
+        let rows = numbers(streams, "obs/eef_pose").chunks_exact_mut(7);
+        rows.for_each(|row| row[3..].iter_mut().for_each(|x| *x = -*x));
     });
     assert!(signed.contains("with w >= 0"), "{signed}");
     assert!(!signed.contains("order"), "the same rotation: {signed}");
@@ -491,15 +348,8 @@ fn data_in_other_files_are_refused() {
 #[test]
 fn counts_and_scripts_of_another_file_are_refused() {
     let problems = |script: &str, total: usize, demos: usize| {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("task.hdf5");
         let environment = json!({ "env_name": "softvt", "env_kwargs": { "script": script } });
-        let demonstration = demonstration(0.0);
-        write_file(&path, &environment, total, demos, |writer| {
-            writer.write_attributes(0, &demonstration.record, STEPS)?;
-            writer.write_streams(0, &demonstration)
-        })
-        .unwrap();
+        let (_folder, path) = write_as(&demonstration(0.0), "task.hdf5", &environment, [total, demos]);
         file(&path).unwrap().problems.join("\n")
     };
     assert_eq!(problems("suites/object_soft.lua", STEPS, 1), "");

@@ -5,7 +5,10 @@ use std::path::PathBuf;
 use clap::{ValueEnum, builder::PossibleValue};
 
 use super::lerobot::LeRobotVersion;
-use softvt_policy::profile::{GripCode, JOINT_NAMES, POSE_NAMES};
+use softvt_policy::{
+    JOINT_NAMES,
+    profile::{GripCode, POSE_NAMES},
+};
 
 /// Format of an exported dataset.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -57,11 +60,6 @@ impl ArmControl {
             Self::Pose => &POSE_NAMES,
             Self::Joints => &JOINT_NAMES,
         }
-    }
-
-    /// Length of the state and of an action: those of the arm, and one of the gripper.
-    pub(super) fn vector_length(self) -> usize {
-        self.motion_names().len() + 1
     }
 }
 

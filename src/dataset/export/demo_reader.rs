@@ -3,41 +3,30 @@
 use std::ops::Range;
 
 use image::{ImageError, RgbImage};
+use sha2::{Digest, Sha256};
 
 use super::{
     ArmControl, ExportJob,
+    features::{self, Content, Feature},
     selection::{ImageSize, SelectedDemo},
 };
 use crate::{
     DatasetError, ImageStack, TaskFile,
-    demonstration::{JOINT_ACTIONS, JOINT_TORQUES, actions_stream_name},
-    layout::IMAGE_STREAMS,
+    streams::{IMAGES, JOINT_ACTIONS, MARKER_MOTION, MARKER_ROW, actions_in},
 };
-use softvt_policy::profile::GripCode;
+use softvt_common::text::hex;
+use softvt_policy::{ROBOT_STREAMS, RobotStream, profile::GripCode};
 use softvt_robot::{panda::ARM_DOFS, tactile::IMAGE_SIZE};
 use softvt_sensing::tactile::{HISTORY_LENGTH, MARKER_COUNT, TactileMosaicLayout, mosaic, mosaic_cell};
 
-/// Shape of the markers of a row: initial positions, those of the previous step and of this one; both fingers; x and y.
-pub(super) const MARKER_SHAPE: [usize; 3] = [3, 2 * MARKER_COUNT, 2];
 /// Images decompressed at once: whole chunks of the file.
 const IMAGES_PER_BLOCK: usize = 32;
 /// Numbers of a row of `actions` and of `obs/state`: a pose, and one of the gripper.
 const ACTION_ROW: usize = 7;
-/// Numbers of the markers in a row, and of one state of one finger.
-pub(super) const MARKER_ROW: usize = MARKER_SHAPE[0] * MARKER_SHAPE[1] * MARKER_SHAPE[2];
+/// Stream of the measured joint positions, rad.
+const JOINTS: &str = "obs/arm_joint_pos";
+/// Numbers of the markers in one state of one finger.
 const FINGER_COORDINATES: usize = 2 * MARKER_COUNT;
-
-/// Numbers of a demonstration, row by row.
-pub(super) struct DemoNumbers {
-    /// Of the arm, and the sensed position of one finger.
-    pub state: Vec<f32>,
-    /// Motion, and one number of the gripper.
-    pub actions: Vec<f32>,
-    /// [`MARKER_SHAPE`] per row.
-    pub markers: Vec<f32>,
-    /// Torques of the arm's drives, if the recording has them.
-    pub joint_torques: Option<Vec<f32>>,
-}
 
 /// Reads a demonstration.
 pub(super) struct DemoReader {
@@ -54,24 +43,26 @@ impl DemoReader {
         Ok(Self { file, demo: demo.entry.demo_id, steps: demo.entry.num_samples })
     }
 
-    /// Reads the numbers of all rows.
+    /// Reads the numbers of a feature, row by row.
     ///
     /// # Errors
     /// A stream is missing, of unexpected shape or not finite.
-    pub(super) fn numbers(&self, job: &ExportJob<'_>) -> Result<DemoNumbers, DatasetError> {
-        let [state, actions] = self.vectors(job.config.control, job.selection.gripper)?;
-        let torques = job.selection.has_joint_torques.then(|| self.floats(JOINT_TORQUES, &[ARM_DOFS]));
-        let joint_torques = torques.transpose()?;
-        let markers = marker_rows(&self.floats("obs/gripper_marker_motion", &[2, 2, MARKER_COUNT, 2])?);
-        Ok(DemoNumbers { state, actions, markers, joint_torques })
-    }
-
-    /// Reads the measured joint positions, rad.
-    ///
-    /// # Errors
-    /// As [`Self::numbers`].
-    pub(super) fn joint_positions(&self) -> Result<Vec<f32>, DatasetError> {
-        self.floats("obs/arm_joint_pos", &[ARM_DOFS])
+    pub(super) fn numbers(&self, job: &ExportJob<'_>, feature: &Feature) -> Result<Vec<f32>, DatasetError> {
+        let control = job.config.control;
+        match (feature.content, feature.name) {
+            (Content::Image(_), _) => Ok(Vec::new()),
+            (Content::Markers, _) => Ok(marker_rows(&self.floats(MARKER_MOTION, &MARKER_ROW)?)),
+            (Content::Action, _) => self.actions(control, job.selection.gripper),
+            (Content::Vector, "state") => self.states(control),
+            (Content::Vector, "joint_state") => self.floats(JOINTS, &[ARM_DOFS]),
+            (Content::Vector, name) => {
+                let is_named =
+                    |stream: &&RobotStream| stream.exported.as_ref().is_some_and(|of| of.name == name);
+                let stream = ROBOT_STREAMS.iter().find(is_named);
+                let path = stream.and_then(|stream| Some(stream.recorded.as_ref()?.path));
+                self.floats(path.unwrap_or(name), &feature.shape)
+            }
+        }
     }
 
     /// Passes the images of every step to `each`: both cameras, and the mosaic of the last images of both fingers.
@@ -85,12 +76,17 @@ impl DemoReader {
     ) -> Result<(), DatasetError> {
         // The last images of each finger, scaled to cells of the mosaic.
         let mut history: [Vec<RgbImage>; 2] = Default::default();
+        let mut hashes = IMAGES.map(|_| Sha256::new());
         for from in (0..self.steps).step_by(IMAGES_PER_BLOCK) {
             if (job.is_cancelled)() {
                 return Err(DatasetError::Interrupted);
             }
             let block = from..self.steps.min(from + IMAGES_PER_BLOCK);
-            let [third, wrist, left, right] = self.image_block(job.selection.image_sizes, block.clone())?;
+            let images = self.image_block(job.selection.image_sizes, block.clone())?;
+            for (hash, images) in hashes.iter_mut().zip(&images) {
+                images.iter().for_each(|image| hash.update(image.as_raw()));
+            }
+            let [third, wrist, left, right] = images;
             let cameras = third.into_iter().zip(wrist);
             let fingers = left.iter().zip(&right);
             for (step, ((third, wrist), (left, right))) in block.zip(cameras.zip(fingers)) {
@@ -107,7 +103,10 @@ impl DemoReader {
                 })?;
             }
         }
-        Ok(())
+        IMAGES
+            .into_iter()
+            .zip(hashes)
+            .try_for_each(|(name, hash)| self.file.check_digest(self.demo, name, &hex(&hash.finalize())))
     }
 
     fn check_shape(&self, name: &str, row_shape: &[usize]) -> Result<(), DatasetError> {
@@ -124,35 +123,28 @@ impl DemoReader {
         Ok(values.into_iter().map(|x| x as f32).collect())
     }
 
-    /// States and actions, row by row: of the arm, and one number of the gripper.
-    fn vectors(&self, control: ArmControl, gripper: GripCode) -> Result<[Vec<f32>; 2], DatasetError> {
-        let states = self.floats("obs/state", &[ACTION_ROW])?;
+    /// States, row by row: of the arm, and the sensed position of one finger.
+    fn states(&self, control: ArmControl) -> Result<Vec<f32>, DatasetError> {
+        let arm = match control {
+            ArmControl::Pose => without_last(&self.floats("obs/state", &[ACTION_ROW])?),
+            ArmControl::Joints => self.floats(JOINTS, &[ARM_DOFS])?,
+        };
         let widths = self.floats("obs/gripper_width_sensed", &[1])?;
-        let actions = self.floats(actions_stream_name(gripper), &[ACTION_ROW])?;
-        let (arm, motions) = match control {
-            ArmControl::Pose => {
-                let without_gripper = |rows: &[f32]| -> Vec<f32> {
-                    rows.chunks_exact(ACTION_ROW).flat_map(|row| &row[..ACTION_ROW - 1]).copied().collect()
-                };
-                (without_gripper(&states), without_gripper(&actions))
-            }
+        Ok(with_last(control, &arm, widths.into_iter().map(|width| 0.5 * width)))
+    }
+
+    /// Actions, row by row: the motion of the arm, and one number of the gripper.
+    fn actions(&self, control: ArmControl, gripper: GripCode) -> Result<Vec<f32>, DatasetError> {
+        let actions = self.floats(actions_in(gripper), &[ACTION_ROW])?;
+        let motion = match control {
+            ArmControl::Pose => without_last(&actions),
             ArmControl::Joints => {
                 let commanded = self.file.joint_commands(self.demo)?;
                 self.check_shape(JOINT_ACTIONS, &[ARM_DOFS])?;
-                (self.joint_positions()?, commanded.into_iter().flatten().map(|x| x as f32).collect())
+                commanded.into_iter().flatten().map(|x| x as f32).collect()
             }
         };
-        let rows = |motion: Vec<f32>, grip: Vec<f32>| -> Vec<f32> {
-            let width = control.vector_length() - 1;
-            motion
-                .chunks_exact(width)
-                .zip(grip)
-                .flat_map(|(row, grip)| row.iter().copied().chain([grip]))
-                .collect()
-        };
-        let fingers = widths.into_iter().map(|width| 0.5 * width).collect();
-        let grips = actions.chunks_exact(ACTION_ROW).map(|row| row[ACTION_ROW - 1]).collect();
-        Ok([rows(arm, fingers), rows(motions, grips)])
+        Ok(with_last(control, &motion, actions.chunks_exact(ACTION_ROW).map(|row| row[ACTION_ROW - 1])))
     }
 
     /// The four image streams of some steps. `sizes` are those of the cameras.
@@ -163,28 +155,36 @@ impl DemoReader {
     ) -> Result<[Vec<RgbImage>; 4], DatasetError> {
         let finger = ImageSize { height: IMAGE_SIZE[1], width: IMAGE_SIZE[0] };
         let mut streams: [Vec<RgbImage>; 4] = Default::default();
-        for ((images, name), size) in
-            streams.iter_mut().zip(IMAGE_STREAMS).zip([third, wrist, finger, finger])
-        {
-            let name = format!("obs/{name}");
-            self.check_shape(&name, &[size.height, size.width, 3])?;
-            let ImageStack { bytes, height, width } = self.file.images(self.demo, &name, steps.clone())?;
+        for ((images, name), size) in streams.iter_mut().zip(IMAGES).zip([third, wrist, finger, finger]) {
+            self.check_shape(name, &[size.height, size.width, 3])?;
+            let ImageStack { bytes, height, width } = self.file.images(self.demo, name, steps.clone())?;
             let each = bytes.chunks_exact((3 * height * width).max(1));
             *images =
                 each.filter_map(|b| RgbImage::from_raw(width as u32, height as u32, b.to_vec())).collect();
             if images.len() != steps.len() {
                 let what = format!("{} images of steps {steps:?}", images.len());
-                return Err(self.file.error(self.demo, &name, what));
+                return Err(self.file.error(self.demo, name, what));
             }
         }
         Ok(streams)
     }
 }
 
+/// Rows of actions without their last number.
+fn without_last(rows: &[f32]) -> Vec<f32> {
+    rows.chunks_exact(ACTION_ROW).flat_map(|row| &row[..ACTION_ROW - 1]).copied().collect()
+}
+
+/// Rows of the arm with one number of the gripper each.
+fn with_last(control: ArmControl, arm: &[f32], grips: impl Iterator<Item = f32>) -> Vec<f32> {
+    let rows = arm.chunks_exact(control.motion_names().len()).zip(grips);
+    rows.flat_map(|(row, grip)| row.iter().copied().chain([grip])).collect()
+}
+
 /// Rows of (3, 198, 2) from stored rows of (finger, initial and present, marker, (x, y)).
 fn marker_rows(stored: &[f32]) -> Vec<f32> {
     let steps: Vec<&[f32]> = stored.chunks_exact(4 * FINGER_COORDINATES).collect();
-    let mut rows = Vec::with_capacity(steps.len() * MARKER_ROW);
+    let mut rows = Vec::with_capacity(steps.len() * features::MARKER_ROW);
     let mut push = |step: &[f32], state: usize| {
         for finger in step.chunks_exact(2 * FINGER_COORDINATES) {
             rows.extend_from_slice(&finger[state * FINGER_COORDINATES..][..FINGER_COORDINATES]);
@@ -202,6 +202,8 @@ fn marker_rows(stored: &[f32]) -> Vec<f32> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    const MARKER_ROW: usize = features::MARKER_ROW;
 
     #[test]
     fn markers_are_arranged_as_in_a_policys_history() {

@@ -8,6 +8,7 @@
 mod config;
 mod demo_reader;
 mod description;
+mod features;
 mod lerobot;
 mod rlds;
 mod selection;

@@ -9,8 +9,9 @@ use super::{ExportConfig, ExportSummary};
 use crate::{
     DatasetError, OptionalStream, TaskFile,
     card::DatasetCard,
-    layout::{DATASET, IMAGE_STREAMS, MANIFEST},
+    layout::{DATASET, MANIFEST},
     manifest::{self, ManifestEntry},
+    streams::IMAGES,
 };
 use softvt_policy::profile::GripCode;
 
@@ -21,8 +22,6 @@ pub(super) struct ImageSize {
     pub width: usize,
 }
 
-/// Names of the images of a row, in order: both cameras, and the mosaic of the fingers.
-pub(super) const IMAGE_FEATURES: [&str; 3] = ["image", "wrist_image", "tactile_image"];
 /// Size of the mosaic.
 const MOSAIC_SIZE: ImageSize = ImageSize { height: 224, width: 224 };
 
@@ -49,14 +48,14 @@ pub(super) struct Selection {
     pub image_sizes: [ImageSize; 2],
     /// Code of the last number of an action.
     pub gripper: GripCode,
-    /// True if the recording has the torques of the arm's drives.
-    pub has_joint_torques: bool,
+    /// Further streams of the recording.
+    pub streams: BTreeSet<OptionalStream>,
     /// True if each demonstration is safe, and does not only reach its goal.
     pub is_safe: bool,
 }
 
 impl Selection {
-    /// Sizes of the images of a row, in the order of [`IMAGE_FEATURES`].
+    /// Sizes of the images of a row: both cameras, and the mosaic of the fingers.
     pub(super) fn feature_sizes(&self) -> [ImageSize; 3] {
         let [third_person, wrist] = self.image_sizes;
         [third_person, wrist, MOSAIC_SIZE]
@@ -111,8 +110,8 @@ pub(super) fn select(config: &ExportConfig) -> Result<Selection, DatasetError> {
     };
     let image_sizes = image_sizes(first)?;
     let gripper = config.gripper.or(card.gripper).unwrap_or_default();
-    let has_joint_torques = card.streams.contains(&OptionalStream::JointTorques);
-    Ok(Selection { demos, prompts, image_sizes, gripper, has_joint_torques, is_safe: card.keep.is_safe() })
+    let is_safe = card.keep.is_safe();
+    Ok(Selection { demos, prompts, image_sizes, gripper, streams: card.streams, is_safe })
 }
 
 fn matching_entries(
@@ -144,8 +143,8 @@ fn matching_entries(
 fn image_sizes(demo: &SelectedDemo) -> Result<[ImageSize; 2], DatasetError> {
     let file = TaskFile::open(&demo.path)?;
     let size = |name: &str| -> Result<ImageSize, DatasetError> {
-        let block = file.images(demo.entry.demo_id, &format!("obs/{name}"), 0..1)?;
+        let block = file.images(demo.entry.demo_id, name, 0..1)?;
         Ok(ImageSize { height: block.height, width: block.width })
     };
-    Ok([size(IMAGE_STREAMS[0])?, size(IMAGE_STREAMS[1])?])
+    Ok([size(IMAGES[0])?, size(IMAGES[1])?])
 }

@@ -3,14 +3,14 @@
 
 use std::path::{Path, PathBuf};
 
-use rust_hdf5::H5Type;
 use serde_json::Value;
 
 use super::{
     super::DatasetError,
-    read::{NumberType, TaskFile},
-    write::{ChunkedSteps, Hdf5Writer, write_file},
+    read::TaskFile,
+    write::{ChunkedSteps, Hdf5Writer, write_file, write_text_attributes},
 };
+use softvt_policy::NumberType;
 
 /// Writes the file of a task; demonstration k is `/data/demo_0` of part k. The file appears complete or not at all.
 ///
@@ -20,15 +20,11 @@ pub fn merge_parts(parts: &[PathBuf], path: &Path, environment: &Value) -> Resul
     let steps = parts.iter().map(|part| TaskFile::open(part)?.steps(0)).collect::<Result<Vec<_>, _>>()?;
     write_file(path, environment, steps.iter().sum(), parts.len(), |writer| {
         // One part is open at a time: there may be more of them than file descriptors.
-        for (demo, (part, steps)) in parts.iter().zip(steps).enumerate() {
+        for (demo, part) in parts.iter().enumerate() {
             let source = TaskFile::open(part)?;
-            writer.write_attributes(demo, &source.record(0)?, steps)?;
+            writer.write_attributes(demo, &source.record(0)?)?;
             for name in source.names(0)? {
-                match source.number_type(0, &name, &source.dataset(0, &name)?)? {
-                    NumberType::F64 => copy_dataset::<f64>(&source, &name, writer, demo)?,
-                    NumberType::F32 => copy_dataset::<f32>(&source, &name, writer, demo)?,
-                    _ => copy_dataset::<u8>(&source, &name, writer, demo)?,
-                }
+                copy_dataset(&source, &name, writer, demo)?;
             }
         }
         Ok(())
@@ -38,7 +34,7 @@ pub fn merge_parts(parts: &[PathBuf], path: &Path, environment: &Value) -> Resul
 /// Identifier of HDF5's shuffle filter.
 const SHUFFLE_FILTER: u16 = 2;
 
-fn copy_dataset<T: H5Type>(
+fn copy_dataset(
     source: &TaskFile,
     name: &str,
     writer: &mut Hdf5Writer,
@@ -46,7 +42,7 @@ fn copy_dataset<T: H5Type>(
 ) -> Result<(), DatasetError> {
     let failed = source.failed(0, name);
     let data = source.dataset(0, name)?;
-    let shape = data.shape();
+    let (shape, number_type) = (data.shape(), source.number_type(0, name, &data)?.unwrap_or(NumberType::U8));
     let per_chunk = data.chunk_dims().and_then(|chunk| chunk.first().copied()).unwrap_or(1).max(1);
     let filters = data.filters().map_err(&failed)?;
     let shuffle = filters.iter().find(|filter| filter.id == SHUFFLE_FILTER);
@@ -54,7 +50,7 @@ fn copy_dataset<T: H5Type>(
         shuffle.and_then(|filter| filter.cd_values.first()).map_or(1, |bytes| *bytes as usize);
     let length = ChunkedSteps { steps: shape[0], per_chunk };
     let key = format!("data/demo_{demo}/{name}");
-    let copy = writer.create_dataset::<T>(&key, length, &shape[1..], shuffle_stride)?;
+    let copy = writer.create_dataset(&key, number_type, length, &shape[1..], shuffle_stride)?;
     let mut offset = vec![0; shape.len()];
     for index in 0..shape[0].div_ceil(per_chunk) {
         offset[0] = index;
@@ -66,5 +62,5 @@ fn copy_dataset<T: H5Type>(
         let text = data.attr(&name).and_then(|attr| attr.read_string()).map_err(&failed)?;
         attributes.push((name, text));
     }
-    writer.write_text_attributes(&key, &copy, &attributes)
+    write_text_attributes(writer.path, &key, &copy, &attributes)
 }

@@ -6,6 +6,5 @@ mod read;
 mod write;
 
 pub use merge::merge_parts;
-pub(super) use read::NumberType;
 pub use read::{FloatArray, ImageStack, TaskFile};
-pub(super) use write::{ChunkedSteps, Hdf5Writer, write_file};
+pub(super) use write::{ChunkedSteps, Hdf5Writer, write_file, write_text_attributes};

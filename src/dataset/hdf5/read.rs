@@ -13,14 +13,15 @@ use serde_json::Value;
 use super::{
     super::{
         DataStream, DatasetError, Demonstration, StreamValues,
-        demonstration::{COMMANDED_ROTATIONS, COMMANDS_JOINTS, JOINT_ACTIONS, actions_stream_name},
-        layout,
+        stream::DIGEST,
+        streams::{self, COMMANDED_ROTATIONS, COMMANDS_JOINTS, JOINT_ACTIONS},
     },
     limits::{self, ListError},
+    write::DemoAttributes,
 };
 use softvt_common::files::FileError;
 use softvt_geometry::Vec3;
-use softvt_policy::{Action, profile::GripCode};
+use softvt_policy::{Action, NumberType};
 use softvt_robot::{ik::ArmAngles, panda::ARM_DOFS};
 use softvt_runs::record::EpisodeRecord;
 
@@ -32,15 +33,6 @@ pub struct TaskFile {
     pub demos: Vec<usize>,
     file: H5File,
     data: H5Group,
-}
-
-/// Number types of the datasets that softvt reads.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum NumberType {
-    F64,
-    F32,
-    U8,
-    Other,
 }
 
 /// Values of a stream as `f64`, in row-major order. The first axis is the step.
@@ -189,9 +181,18 @@ impl TaskFile {
         self.file_attribute(name).is_some_and(|text| is_number(&text, expected as u64))
     }
 
-    /// True if an attribute of a demonstration is another integer than `expected`, or is one of another type.
-    pub(crate) fn contradicts(&self, demo: usize, attribute: &str, expected: u64) -> bool {
-        self.text(demo, attribute).is_ok_and(|text| !is_number(&text, expected))
+    /// Names of the attributes of a demonstration that are not those of its record, and what they are.
+    pub(crate) fn contradictions(&self, demo: usize, record: &EpisodeRecord) -> Vec<(&'static str, String)> {
+        let DemoAttributes { numbers, texts } = DemoAttributes::new(demo, record);
+        let numbers = numbers.into_iter().filter_map(|(name, expected)| {
+            let is_other = self.text(demo, name).is_ok_and(|text| !is_number(&text, expected as u64));
+            is_other.then(|| (name, format!("not {expected}, as metadata_json says")))
+        });
+        let texts = texts.into_iter().filter_map(|(name, expected)| {
+            let stated = self.text(demo, name).ok().filter(|stated| stated != expected)?;
+            Some((name, format!("{stated:?}, and metadata_json says {expected:?}")))
+        });
+        numbers.chain(texts).collect()
     }
 
     /// True if a demonstration has a dataset of this name, readable or not.
@@ -271,33 +272,53 @@ impl TaskFile {
         let data = self.dataset(demo, name)?;
         let failed = self.failed(demo, name);
         let values = match self.number_type(demo, name, &data)? {
-            NumberType::F32 => data.read_raw().map(StreamValues::F32).map_err(&failed),
-            NumberType::U8 => data.read_raw().map(StreamValues::U8).map_err(&failed),
-            _ => self.read_f64(demo, name, &data).map(StreamValues::F64),
+            Some(NumberType::F32) => data.read_raw().map(StreamValues::F32).map_err(&failed),
+            Some(NumberType::U8) => data.read_raw().map(StreamValues::U8).map_err(&failed),
+            Some(NumberType::F64) | None => self.read_f64(demo, name, &data).map(StreamValues::F64),
         };
+        let values = values?;
         let mut attributes = Vec::new();
-        for name in data.attr_names().map_err(&failed)? {
+        for attribute in data.attr_names().map_err(&failed)? {
             // Other programs may store numbers here.
-            if let Ok(text) = data.attr(&name).and_then(|attr| attr.read_string()) {
-                attributes.push((name, text));
+            let Ok(text) = data.attr(&attribute).and_then(|attr| attr.read_string()) else { continue };
+            if attribute != DIGEST {
+                attributes.push((attribute, text));
             }
         }
+        self.check_digest(demo, name, &values.sha256())?;
         let row_shape = data.shape().get(1..).unwrap_or_default().to_vec();
-        Ok(DataStream { name: name.to_owned(), row_shape, values: values?, attributes })
+        Ok(DataStream { name: name.to_owned(), row_shape, values, attributes })
     }
 
-    /// Type of the numbers of a dataset.
+    /// Checks that the digest of a stream, if it has one, is this one of its numbers.
+    ///
+    /// # Errors
+    /// The stream was changed after it was recorded.
+    pub(crate) fn check_digest(&self, demo: usize, name: &str, digest: &str) -> Result<(), DatasetError> {
+        let data = self.dataset(demo, name)?;
+        let recorded = data.attr(DIGEST).and_then(|attribute| attribute.read_string());
+        match recorded.is_ok_and(|recorded| recorded != digest) {
+            true => Err(self.error(
+                demo,
+                name,
+                "it was changed after the recording: its sha256 is of other numbers",
+            )),
+            false => Ok(()),
+        }
+    }
+
+    /// Type of the numbers of a dataset; `None` for one that softvt does not write.
     pub(crate) fn number_type(
         &self,
         demo: usize,
         name: &str,
         data: &H5Dataset,
-    ) -> Result<NumberType, DatasetError> {
+    ) -> Result<Option<NumberType>, DatasetError> {
         Ok(match data.datatype().map_err(self.failed(demo, name))? {
-            DatatypeMessage::FloatingPoint { size: 8, .. } => NumberType::F64,
-            DatatypeMessage::FloatingPoint { size: 4, .. } => NumberType::F32,
-            DatatypeMessage::FixedPoint { size: 1, signed: false, .. } => NumberType::U8,
-            _ => NumberType::Other,
+            DatatypeMessage::FloatingPoint { size: 8, .. } => Some(NumberType::F64),
+            DatatypeMessage::FloatingPoint { size: 4, .. } => Some(NumberType::F32),
+            DatatypeMessage::FixedPoint { size: 1, signed: false, .. } => Some(NumberType::U8),
+            _ => None,
         })
     }
 
@@ -318,9 +339,8 @@ impl TaskFile {
     /// # Errors
     /// As [`TaskFile::stream`].
     pub fn array(&self, demo: usize, name: &str) -> Result<FloatArray, DatasetError> {
-        let data = self.dataset(demo, name)?;
-        let values = self.read_f64(demo, name, &data)?;
-        Ok(FloatArray { values, shape: data.shape() })
+        let values = self.stream(demo, name)?.values.into_f64();
+        Ok(FloatArray { values, shape: self.shape(demo, name)? })
     }
 
     /// As [`Self::array`], of finite values.
@@ -418,25 +438,10 @@ impl TaskFile {
     /// # Errors
     /// The demonstration was not recorded by softvt, or the file is damaged.
     pub fn read(&self, demo: usize) -> Result<Demonstration, DatasetError> {
-        let binary = self.array(demo, "actions_binary")?.values;
-        let forces = self.array(demo, actions_stream_name(GripCode::Force))?.values;
-        let mut read = Demonstration {
-            record: self.record(demo)?,
-            actions: self.actions(demo)?,
-            joint_commands: self.joint_commands(demo)?,
-            gripper_closed: binary.chunks(7).map(|row| row[6] > 0.5).collect(),
-            grip_labels_n: forces.chunks(7).map(|row| row[6]).collect(),
-            observed: Vec::new(),
-            privileged: Vec::new(),
-        };
-        for name in self.names(demo)? {
-            if name.starts_with("privileged/") {
-                read.privileged.push(self.stream(demo, &name)?);
-            } else if name.starts_with("obs/") && !layout::is_image_stream(&name) {
-                read.observed.push(self.stream(demo, &name)?);
-            }
-        }
-        Ok(read)
+        let is_rendered = |name: &String| streams::named(name).is_some_and(|spec| spec.is_rendered());
+        let names = self.names(demo)?.into_iter().filter(|name| !is_rendered(name));
+        let streams = names.map(|name| self.stream(demo, &name)).collect::<Result<_, _>>()?;
+        Ok(Demonstration { record: self.record(demo)?, streams })
     }
 }
 

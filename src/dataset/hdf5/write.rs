@@ -2,13 +2,14 @@
 
 use std::{collections::BTreeSet, path::Path};
 
-use rust_hdf5::{FilterPipeline, H5Dataset, H5File, H5Group, H5Type};
+use rust_hdf5::{FilterPipeline, H5Dataset, H5File, H5Group};
 use serde_json::{Value, json};
 
-use super::super::{DataStream, DatasetError, Demonstration, StreamValues};
+use super::super::{DataStream, DatasetError, StreamValues, stream::DIGEST};
 use softvt_benchmark::CONTROL_HZ;
 use softvt_common::files;
-use softvt_runs::record::EpisodeRecord;
+use softvt_policy::NumberType;
+use softvt_runs::record::{EpisodeHeader, EpisodeRecord};
 
 /// Largest chunk of numbers, bytes. Readers of one step decompress a whole chunk.
 const MAX_CHUNK_BYTES: usize = 1 << 18;
@@ -20,6 +21,33 @@ const COMPRESSION_LEVEL: u32 = 4;
 pub(crate) struct ChunkedSteps {
     pub steps: usize,
     pub per_chunk: usize,
+}
+
+/// Attributes of a demonstration beside its record, which has them too.
+pub(super) struct DemoAttributes<'a> {
+    pub numbers: [(&'static str, i64); 5],
+    pub texts: [(&'static str, &'a str); 4],
+}
+
+impl<'a> DemoAttributes<'a> {
+    pub(super) fn new(demo: usize, record: &'a EpisodeRecord) -> Self {
+        let EpisodeHeader { id, prompt, asset, .. } = &record.header;
+        Self {
+            numbers: [
+                ("num_samples", i64::from(record.stats.steps)),
+                ("task_id", id.task as i64),
+                ("demo_id", demo as i64),
+                ("attempt", i64::from(id.episode)),
+                ("success", i64::from(record.verdict.safety)),
+            ],
+            texts: [
+                ("task_suite", &id.suite),
+                ("language", prompt),
+                ("asset_name", asset),
+                ("state_hash", &record.stats.state_hash),
+            ],
+        }
+    }
 }
 
 /// Writes a file that appears complete or not at all. `total` is the number of steps in all `demos` demonstrations.
@@ -85,73 +113,50 @@ impl<'a> Hdf5Writer<'a> {
         &mut self,
         demo: usize,
         record: &EpisodeRecord,
-        steps: usize,
     ) -> Result<(), DatasetError> {
         let key = format!("data/demo_{demo}");
         let group = self.group(&key)?;
         let failed = DatasetError::hdf5(self.path, &key);
-        let header = &record.header;
-        let id = &header.id;
-        for (name, number) in [
-            ("num_samples", steps as i64),
-            ("task_id", id.task as i64),
-            ("demo_id", demo as i64),
-            ("attempt", i64::from(id.episode)),
-            ("success", i64::from(record.verdict.safety)),
-        ] {
+        let DemoAttributes { numbers, texts } = DemoAttributes::new(demo, record);
+        for (name, number) in numbers {
             group.set_attr_numeric(name, &number).map_err(&failed)?;
         }
-        let metadata = json!(record).to_string();
-        for (name, text) in [
-            ("task_suite", id.suite.as_str()),
-            ("language", &header.prompt),
-            ("asset_name", &header.asset),
-            ("state_hash", &record.stats.state_hash),
-            ("metadata_json", &metadata),
-        ] {
+        for (name, text) in texts {
             group.set_attr_string(name, text).map_err(&failed)?;
         }
-        Ok(())
+        group.set_attr_string("metadata_json", &json!(record).to_string()).map_err(&failed)
     }
 
-    /// Writes all streams of a demonstration other than images.
-    pub(crate) fn write_streams(
+    /// Writes a stream of a demonstration with so many steps.
+    pub(crate) fn write_stream(
         &mut self,
         demo: usize,
-        demonstration: &Demonstration,
-    ) -> Result<(), DatasetError> {
-        let top_level = demonstration.top_level_streams();
-        for stream in top_level.iter().chain(&demonstration.observed).chain(&demonstration.privileged) {
-            let (key, steps) = (format!("data/demo_{demo}/{}", stream.name), demonstration.steps());
-            match &stream.values {
-                StreamValues::F64(values) => self.write_stream(&key, stream, steps, values)?,
-                StreamValues::F32(values) => self.write_stream(&key, stream, steps, values)?,
-                StreamValues::U8(values) => self.write_stream(&key, stream, steps, values)?,
-            }
-        }
-        Ok(())
-    }
-
-    fn write_stream<T: H5Type>(
-        &mut self,
-        key: &str,
-        stream: &DataStream,
         steps: usize,
-        values: &[T],
+        stream: &DataStream,
     ) -> Result<(), DatasetError> {
-        let width = stream.row_shape.iter().product::<usize>() * size_of::<T>();
+        let key = format!("data/demo_{demo}/{}", stream.name);
+        let number_type = stream.values.number_type();
+        let size = number_type.bytes();
+        let width = stream.row_shape.iter().product::<usize>() * size;
         let per_chunk = (MAX_CHUNK_BYTES / width.max(1)).clamp(1, steps.max(1));
         let length = ChunkedSteps { steps, per_chunk };
-        let data = self.create_dataset::<T>(key, length, &stream.row_shape, size_of::<T>())?;
-        data.write_raw(values).map_err(DatasetError::hdf5(self.path, key))?;
-        self.write_text_attributes(key, &data, &stream.attributes)
+        let data = self.create_dataset(&key, number_type, length, &stream.row_shape, size)?;
+        let written = match &stream.values {
+            StreamValues::F64(values) => data.write_raw(values),
+            StreamValues::F32(values) => data.write_raw(values),
+            StreamValues::U8(values) => data.write_raw(values),
+        };
+        written.map_err(DatasetError::hdf5(self.path, &key))?;
+        write_text_attributes(self.path, &key, &data, &stream.attributes)?;
+        write_text_attributes(self.path, &key, &data, &[(DIGEST, stream.values.sha256())])
     }
 
     /// Creates a dataset. Before compression, HDF5's shuffle filter groups the bytes of a chunk that are
     /// `shuffle_stride` bytes apart; 1 disables it.
-    pub(crate) fn create_dataset<T: H5Type>(
+    pub(crate) fn create_dataset(
         &mut self,
         key: &str,
+        number_type: NumberType,
         length: ChunkedSteps,
         row_shape: &[usize],
         shuffle_stride: usize,
@@ -159,53 +164,22 @@ impl<'a> Hdf5Writer<'a> {
         let (group, name) = key.rsplit_once('/').unwrap_or(("", key));
         let group = self.group(group)?;
         let [shape, chunk] = [length.steps, length.per_chunk].map(|first| [&[first], row_shape].concat());
-        let builder = group.new_dataset::<T>().shape(shape).chunk(&chunk);
         let filters = match shuffle_stride {
             1 => FilterPipeline::deflate(COMPRESSION_LEVEL),
             _ => FilterPipeline::shuffle_deflate(shuffle_stride as u32, COMPRESSION_LEVEL),
         };
-        builder.filter_pipeline(filters).create(name).map_err(DatasetError::hdf5(self.path, key))
-    }
-
-    /// Creates the dataset of an image stream. Within a chunk the values of one pixel in successive images are stored
-    /// next to each other, so that static parts of the image compress well.
-    pub(crate) fn create_image_dataset(
-        &mut self,
-        demo: usize,
-        name: &str,
-        length: ChunkedSteps,
-        width: u32,
-        height: u32,
-    ) -> Result<H5Dataset, DatasetError> {
-        let key = format!("data/demo_{demo}/obs/{name}");
-        let row_shape = [height as usize, width as usize, 3];
-        let shuffle_stride = if length.per_chunk > 1 { row_shape.iter().product() } else { 1 };
-        let data = self.create_dataset::<u8>(&key, length, &row_shape, shuffle_stride)?;
-        let axes = [("axes".to_owned(), "step, row from the top, column, RGB (sRGB)".to_owned())];
-        self.write_text_attributes(&key, &data, &axes)?;
-        Ok(data)
-    }
-
-    /// Creates the dataset of a stream of depth images, float32.
-    pub(crate) fn create_depth_dataset(
-        &mut self,
-        demo: usize,
-        name: &str,
-        length: ChunkedSteps,
-        width: u32,
-        height: u32,
-    ) -> Result<H5Dataset, DatasetError> {
-        let key = format!("data/demo_{demo}/obs/{name}");
-        let row_shape = [height as usize, width as usize];
-        let data = self.create_dataset::<f32>(&key, length, &row_shape, size_of::<f32>())?;
-        let attributes = [
-            ("unit", "m"),
-            ("axes", "step, row from the top, column"),
-            ("meaning", "depth along the optical axis; infinite in the background"),
-        ];
-        let attributes = attributes.map(|(name, text)| (name.to_owned(), text.to_owned()));
-        self.write_text_attributes(&key, &data, &attributes)?;
-        Ok(data)
+        let created = match number_type {
+            NumberType::F64 => {
+                group.new_dataset::<f64>().shape(shape).chunk(&chunk).filter_pipeline(filters).create(name)
+            }
+            NumberType::F32 => {
+                group.new_dataset::<f32>().shape(shape).chunk(&chunk).filter_pipeline(filters).create(name)
+            }
+            NumberType::U8 => {
+                group.new_dataset::<u8>().shape(shape).chunk(&chunk).filter_pipeline(filters).create(name)
+            }
+        };
+        created.map_err(DatasetError::hdf5(self.path, key))
     }
 
     /// Closes the file. If `written` is an error, the file is closed without syncing and the error returned.
@@ -218,19 +192,19 @@ impl<'a> Hdf5Writer<'a> {
         let path = self.path;
         self.file.close().map_err(DatasetError::hdf5(path, "/"))
     }
+}
 
-    /// Writes text attributes of the dataset `key`.
-    pub(super) fn write_text_attributes(
-        &self,
-        key: &str,
-        data: &H5Dataset,
-        attributes: &[(String, String)],
-    ) -> Result<(), DatasetError> {
-        for (name, text) in attributes {
-            let attribute = data.new_attr::<rust_hdf5::VarLenUnicode>().shape(()).create(name);
-            let written = attribute.and_then(|attribute| attribute.write_string(text));
-            written.map_err(DatasetError::hdf5(self.path, key))?;
-        }
-        Ok(())
+/// Writes text attributes of the dataset `key`.
+pub(crate) fn write_text_attributes(
+    path: &Path,
+    key: &str,
+    data: &H5Dataset,
+    attributes: &[(impl AsRef<str>, impl AsRef<str>)],
+) -> Result<(), DatasetError> {
+    for (name, text) in attributes {
+        let attribute = data.new_attr::<rust_hdf5::VarLenUnicode>().shape(()).create(name.as_ref());
+        let written = attribute.and_then(|attribute| attribute.write_string(text.as_ref()));
+        written.map_err(DatasetError::hdf5(path, key))?;
     }
+    Ok(())
 }

@@ -2,8 +2,9 @@
 
 use rust_hdf5::DatatypeMessage;
 
-use super::super::{DatasetError, FloatArray, TaskFile, hdf5::NumberType};
+use super::super::{DatasetError, FloatArray, TaskFile};
 use softvt_geometry::{Pose, Quat, Vec3};
+use softvt_policy::NumberType;
 
 /// One demonstration of a foreign file. Errors of its methods name the file and the key.
 #[derive(Clone, Copy)]
@@ -60,7 +61,7 @@ impl DemoReader<'_> {
     pub(super) fn array(&self, name: &str) -> Result<FloatArray, DatasetError> {
         let data = self.file.dataset(self.demo, name)?;
         let number_type = self.file.number_type(self.demo, name, &data)?;
-        if !matches!(number_type, NumberType::F64 | NumberType::F32) {
+        if !matches!(number_type, Some(NumberType::F64 | NumberType::F32)) {
             let got = match data.datatype() {
                 Ok(DatatypeMessage::FloatingPoint { size, .. }) => format!("float{}", 8 * size),
                 Ok(DatatypeMessage::FixedPoint { .. }) => "integers".to_owned(),

@@ -137,7 +137,7 @@ fn relative_steps(reader: DemoReader, header: &Header) -> Result<Vec<ToolCommand
 }
 
 /// Joint angles of the arm.
-struct RecordedArm {
+struct LiberoArm {
     /// Key of the observations.
     name: &'static str,
     /// As stored.
@@ -150,7 +150,7 @@ fn arm_angles(
     reader: DemoReader,
     states: &[Vec<f64>],
     steps: usize,
-) -> Result<Option<RecordedArm>, DatasetError> {
+) -> Result<Option<LiberoArm>, DatasetError> {
     let Some(name) = JOINT_KEYS.into_iter().find(|name| reader.has(name)) else { return Ok(None) };
     let observed = tool_pose::joint_angles(reader, name, steps)?;
     let before = match observed_after_action(states, &observed) {
@@ -159,7 +159,7 @@ fn arm_angles(
         None if name.contains("robot0") => observed.clone(),
         None => delayed(&observed),
     };
-    Ok(Some(RecordedArm { name, observed, before }))
+    Ok(Some(LiberoArm { name, observed, before }))
 }
 
 /// True if observations are from after each action, judged by the joints in robosuite's states (time, then positions,

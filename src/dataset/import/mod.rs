@@ -90,29 +90,11 @@ fn softvt_demo(reader: DemoReader) -> Result<ForeignDemo, DatasetError> {
 /// An attribute or a time differs from the record.
 fn check_attributes(reader: DemoReader, record: &EpisodeRecord) -> Result<(), DatasetError> {
     let DemoReader { file, demo } = reader;
-    let (header, id) = (&record.header, &record.header.id);
-    let refuse = |name: &str, what: String| {
-        Err(DatasetError::content(&file.path, format!("/data/demo_{demo}, attribute {name}"), what))
-    };
-    for (name, recorded) in [
-        ("language", &header.prompt),
-        ("task_suite", &id.suite),
-        ("asset_name", &header.asset),
-        ("state_hash", &record.stats.state_hash),
-    ] {
-        if let Ok(stated) = file.text(demo, name)
-            && stated != *recorded
-        {
-            let what = format!(
-                "{stated:?}, and metadata_json says {recorded:?}; the record decides: relabel the imported demonstrations instead"
-            );
-            return refuse(name, what);
-        }
-    }
-    for (name, recorded) in [("task_id", id.task as u64), ("attempt", u64::from(id.episode))] {
-        if file.contradicts(demo, name, recorded) {
-            return refuse(name, format!("not {recorded}, which metadata_json says and which decides"));
-        }
+    // A demonstration may have been copied to another place in a file.
+    let other = file.contradictions(demo, record).into_iter().find(|(name, _)| *name != "demo_id");
+    if let Some((name, what)) = other {
+        let what = format!("{what}; the record decides: relabel the imported demonstrations instead");
+        return Err(DatasetError::content(&file.path, format!("/data/demo_{demo}, attribute {name}"), what));
     }
     if !reader.has("timestamps") {
         return Ok(());

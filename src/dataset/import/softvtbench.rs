@@ -40,13 +40,13 @@ const FINGER_POSITION: GripperValues = GripperValues::new(0.04, 0.0);
 const SIGN: GripperValues = GripperValues { code: GripCode::Binary, ..GripperValues::new(1.0, -1.0) };
 
 /// An action of 7 numbers.
-struct RecordedAction {
+struct SoftvtbenchAction {
     numbers: [f64; 7],
     /// True if forces are recorded and both fingers are pressed.
     is_pressed: bool,
 }
 
-impl RecordedAction {
+impl SoftvtbenchAction {
     fn position(&self) -> Vec3 {
         Vec3::from_column_slice(&self.numbers[..3])
     }
@@ -75,7 +75,7 @@ pub(super) fn demo(reader: DemoReader, header: &Header) -> Result<ForeignDemo, D
     check_lead(reader, &actions, &poses.poses)?;
     let gripper = gripper_encoding(reader, &actions)?;
     let is_measured = fingers_are_measured(reader, &actions)?;
-    let command = |action: &RecordedAction| {
+    let command = |action: &SoftvtbenchAction| {
         let position_b = action.position() - action.rotation() * offset_t;
         let closure = gripper.closure(action.gripper()).clamp(0.0, 1.0);
         ToolCommand::from(Action::new(position_b, action.axis_angle(), closure))
@@ -126,14 +126,17 @@ fn initial_joints(reader: DemoReader) -> Result<Option<[f64; 7]>, DatasetError> 
     }
 }
 
-fn actions(reader: DemoReader) -> Result<Vec<RecordedAction>, DatasetError> {
+fn actions(reader: DemoReader) -> Result<Vec<SoftvtbenchAction>, DatasetError> {
     const KEY: &str = "actions";
     if reader.shape(KEY)?.get(1) == Some(&7) {
         let rows = reader.rows::<7>(KEY, None)?;
-        return Ok(rows.into_iter().map(|numbers| RecordedAction { numbers, is_pressed: false }).collect());
+        return Ok(rows
+            .into_iter()
+            .map(|numbers| SoftvtbenchAction { numbers, is_pressed: false })
+            .collect());
     }
     let is_pressed = |force: &[f64]| Vec3::from_column_slice(force).norm() > MIN_HOLD_FORCE;
-    let action = |row: &[f64; 13]| RecordedAction {
+    let action = |row: &[f64; 13]| SoftvtbenchAction {
         numbers: std::array::from_fn(|i| row[i]),
         is_pressed: is_pressed(&row[7..10]) && is_pressed(&row[10..]),
     };
@@ -144,7 +147,7 @@ fn actions(reader: DemoReader) -> Result<Vec<RecordedAction>, DatasetError> {
 ///
 /// # Errors
 /// Not unit quaternions, or in the order x y z w.
-fn poses(reader: DemoReader, actions: &[RecordedAction]) -> Result<RecordedPoses, DatasetError> {
+fn poses(reader: DemoReader, actions: &[SoftvtbenchAction]) -> Result<RecordedPoses, DatasetError> {
     let rows = reader.rows::<7>(POSES, Some(actions.len()))?;
     if let Some(step) = rows.iter().position(|row| !is_unit(&row[3..])) {
         let what = format!("step {step}: not a unit quaternion w x y z: {:?}", &rows[step][3..]);
@@ -154,7 +157,7 @@ fn poses(reader: DemoReader, actions: &[RecordedAction]) -> Result<RecordedPoses
         let q = |row: &[f64; 7]| nalgebra::Quaternion::new(row[3 + w], row[3 + x], row[3 + y], row[3 + z]);
         rows.iter().map(|row| Quat::new_normalize(q(row))).collect()
     };
-    let commanded: Vec<Quat> = actions.iter().map(RecordedAction::rotation).collect();
+    let commanded: Vec<Quat> = actions.iter().map(SoftvtbenchAction::rotation).collect();
     let wxyz = in_order([0, 1, 2, 3]);
     let angle_wxyz = tool_pose::mean_angle(&wxyz, &commanded);
     let angle_xyzw = tool_pose::mean_angle(&in_order([3, 0, 1, 2]), &commanded);
@@ -177,7 +180,7 @@ fn poses(reader: DemoReader, actions: &[RecordedAction]) -> Result<RecordedPoses
 ///
 /// # Errors
 /// Not absolute poses in the base frame in m and rad.
-fn check_lead(reader: DemoReader, actions: &[RecordedAction], poses: &[Pose]) -> Result<(), DatasetError> {
+fn check_lead(reader: DemoReader, actions: &[SoftvtbenchAction], poses: &[Pose]) -> Result<(), DatasetError> {
     let (mut distance, mut angle) = (0.0, 0.0);
     for (action, pose) in actions.iter().zip(poses) {
         distance += (action.position() - pose.translation.vector).norm();
@@ -216,7 +219,10 @@ fn tool_offset(reader: DemoReader, poses: &RecordedPoses, joints: &[[f64; 7]]) -
 ///
 /// # Errors
 /// The values fit neither encoding.
-fn gripper_encoding(reader: DemoReader, actions: &[RecordedAction]) -> Result<GripperValues, DatasetError> {
+fn gripper_encoding(
+    reader: DemoReader,
+    actions: &[SoftvtbenchAction],
+) -> Result<GripperValues, DatasetError> {
     let is_position = |x: f64| (FINGER_RANGE[0]..=FINGER_RANGE[1]).contains(&x);
     let Some(step) = actions.iter().position(|action| !is_position(action.gripper())) else {
         return Ok(FINGER_POSITION);
@@ -232,10 +238,10 @@ fn gripper_encoding(reader: DemoReader, actions: &[RecordedAction]) -> Result<Gr
 }
 
 /// True if the finger positions in the actions are the measured ones.
-fn fingers_are_measured(reader: DemoReader, actions: &[RecordedAction]) -> Result<bool, DatasetError> {
+fn fingers_are_measured(reader: DemoReader, actions: &[SoftvtbenchAction]) -> Result<bool, DatasetError> {
     let fingers = reader.rows_if_present::<2>("obs/gripper_pos", actions.len())?;
     let is_measured =
-        |action: &RecordedAction, finger: f64| (action.gripper() - finger).abs() < MEASURED_TOLERANCE;
+        |action: &SoftvtbenchAction, finger: f64| (action.gripper() - finger).abs() < MEASURED_TOLERANCE;
     Ok(fingers
         .is_some_and(|fingers| actions.iter().zip(fingers).all(|(a, finger)| is_measured(a, finger[0]))))
 }

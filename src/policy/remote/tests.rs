@@ -15,9 +15,9 @@ use super::*;
 use softvt_common::cancel::CancelFlag;
 
 use crate::{
-    EncodedGrip, GripTarget, RobotState,
+    EncodedGrip, GripTarget, RobotState, StatePart,
     msgpack::{map, pack},
-    profile::{ActionEncoding, GripperValues, ObservationSource, PoseEncoding, ProfileInput, RobotStatePart},
+    profile::{ActionEncoding, GripperValues, ObservationSource, PoseEncoding, ProfileInput},
 };
 
 type Socket = WebSocket<TcpStream>;
@@ -72,7 +72,7 @@ fn chunk(closure: f64) -> Value {
 }
 
 fn policy_server(url: String, code: GripCode, timeout: Duration) -> PolicyServer {
-    let state = ObservationSource::State { parts: vec![RobotStatePart::Position] };
+    let state = ObservationSource::State { parts: StatePart::named("position").into_iter().collect() };
     let gripper = GripperValues { code, ..GripperValues::new(0.0, 1.0) };
     let profile = Profile {
         name: "state".to_owned(),
@@ -86,7 +86,7 @@ fn policy_server(url: String, code: GripCode, timeout: Duration) -> PolicyServer
 fn observation() -> Observation {
     Observation {
         time_s: 0.0,
-        robot: RobotState::ORIGIN,
+        robot: RobotState::default(),
         prompt: String::new(),
         cameras: Vec::new(),
         past: Vec::new(),

@@ -10,7 +10,8 @@ use foxglove::messages::{
 use super::messages::{pose, rotation, timestamp, translation};
 use softvt_geometry::{Pose, Quat, Vec3};
 use softvt_physics::{BodyId, SoftId, world::WorldSnapshot};
-use softvt_rollout::{Proprioception, SensingError, Sensors, strain_colour};
+use softvt_policy::RobotState;
+use softvt_rollout::{SensingError, Sensors, strain_colour};
 use softvt_sensing::camera::DisplayMesh;
 
 /// The frame of everything else.
@@ -67,10 +68,10 @@ impl SceneGeometry {
         &self,
         sensors: &Sensors,
         frame: &WorldSnapshot,
-        robot: &Proprioception,
+        robot: &RobotState,
         time_ns: u64,
     ) -> FrameTransforms {
-        let tool_w = sensors.base_w() * robot.tool_b;
+        let tool_w = sensors.base_w() * robot.tool_b();
         // Cameras look along -z, and the frames of Foxglove's along z.
         let optical = Pose::from_parts(
             Vec3::zeros().into(),

@@ -12,8 +12,8 @@ use image::RgbImage;
 use softvt_geometry::Pose;
 use softvt_media::jpeg::encode_jpeg;
 use softvt_physics::world::WorldSnapshot;
-use softvt_robot::gripper;
-use softvt_rollout::{Proprioception, Sensors, StateDeformation};
+use softvt_policy::RobotState;
+use softvt_rollout::{Sensors, StateDeformation};
 use softvt_runs::record::EpisodeRecord;
 use softvt_scene::Camera;
 
@@ -32,9 +32,9 @@ pub(super) struct Gripper {
 }
 
 impl Gripper {
-    pub(super) fn new(frame: &WorldSnapshot, robot: &Proprioception) -> Self {
+    pub(super) fn new(frame: &WorldSnapshot, robot: &RobotState) -> Self {
         let [left, right] = Sensors::pad_forces(frame).map(|force| force.wrench.normal());
-        Self { width_m: gripper::width(robot.fingers), left_force_n: left, right_force_n: right }
+        Self { width_m: robot.gripper_width_m, left_force_n: left, right_force_n: right }
     }
 }
 
@@ -100,10 +100,10 @@ pub(super) fn calibration(camera: &Camera, time_ns: u64) -> CameraCalibration {
 }
 
 /// Angles of the arm, and displacements of the fingers.
-pub(super) fn joints(robot: &Proprioception, time_ns: u64) -> JointStates {
+pub(super) fn joints(robot: &RobotState, time_ns: u64) -> JointStates {
     let fingers = ["finger_left", "finger_right"].map(str::to_owned);
     let names = (1..=robot.joints.len()).map(|joint| format!("joint_{joint}")).chain(fingers);
-    let positions = robot.joints.iter().chain(&robot.fingers);
+    let positions = robot.joints.iter().chain(&robot.fingers_m);
     let joint = |(name, position): (String, &f64)| JointState {
         name,
         position: Some(*position),

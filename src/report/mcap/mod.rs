@@ -248,11 +248,11 @@ impl StateMessages<'_> {
         let (recording, topics, geometry) = (self.recording, self.topics, self.geometry);
         let (frame, time_ns) = (&recording.frames[index], time_ns(index));
         let before = index.checked_sub(1).map(|before| &recording.frames[before]);
-        let robot = sensors.proprioception(frame);
+        let robot = &recording.robot[index];
         let mut all = vec![
-            encoded(topics.transforms, &geometry.transforms(sensors, frame, &robot, time_ns))?,
-            encoded(topics.joints, &messages::joints(&robot, time_ns))?,
-            encoded(topics.gripper, &Gripper::new(frame, &robot))?,
+            encoded(topics.transforms, &geometry.transforms(sensors, frame, robot, time_ns))?,
+            encoded(topics.joints, &messages::joints(robot, time_ns))?,
+            encoded(topics.gripper, &Gripper::new(frame, robot))?,
         ];
         if let Some(update) = geometry.update(sensors, frame, before, time_ns) {
             all.push(encoded(topics.scene, &update)?);

@@ -1,4 +1,4 @@
-//! Sensors of a simulation and their checks before an episode: images, tactile readings, forces and proprioception.
+//! Sensors of a simulation and their checks before an episode: images, tactile readings and forces.
 //! Each is a pure function of a [`WorldSnapshot`] (a state of the world), so that it can be computed on demand, also
 //! after the episode.
 
@@ -13,21 +13,15 @@ use super::{
     sensor_noise::SensorSeed,
     simulation::{ObjectInstance, Simulation},
 };
-use softvt_benchmark::CONTROL_DT;
 use softvt_evaluation::stage::TaskStage;
 use softvt_geometry::{Pose, Vec3};
 use softvt_physics::{
     ArticulationId, BodyId, ColliderId, ContactPartner,
     world::{ContactPatch, WorldSnapshot},
 };
-use softvt_policy::{PadForce, SensorStreams, TactileFrame};
+use softvt_policy::{PadForce, RobotState, SensorStreams, TactileFrame};
 use softvt_robot::tactile::{OpticsModel, TactileSpec};
-use softvt_robot::{
-    RobotSpec, Side, gripper,
-    ik::DiffIk,
-    pads,
-    panda::{self, ARM_DOFS},
-};
+use softvt_robot::{RobotSpec, Side, pads, panda};
 use softvt_scene::{Camera, CameraMount, ROBOT_SEGMENTATION_ID, Scene};
 use softvt_sensing::{
     camera::{
@@ -396,20 +390,6 @@ impl Sensors {
         self.scene.base_w
     }
 
-    /// Proprioception in a state.
-    pub fn proprioception(&self, frame: &WorldSnapshot) -> Proprioception {
-        let q = &frame.joints[self.articulation.index()];
-        let joints = std::array::from_fn(|i| q[i]);
-        let fingers = [q[ARM_DOFS], q[ARM_DOFS + 1]];
-        let width = gripper::width(fingers);
-        Proprioception {
-            tool_b: DiffIk::new(&self.robot.ik, joints, CONTROL_DT).tool_pose(&joints),
-            joints,
-            fingers,
-            sensed_width_m: self.seed.sensed_width(&self.robot.width_sensor, width, frame.step),
-        }
-    }
-
     /// Names and configurations of all movable objects, in the order of the scene.
     pub fn body_configurations<'a>(
         &'a self,
@@ -527,19 +507,6 @@ fn substrate_of(object: &ObjectInstance) -> Option<SubstrateCompliance> {
     Some(SubstrateCompliance { modulus, resolved: 2.0 * model.mesh.edge })
 }
 
-/// Measurements of the robot's own sensors.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Proprioception {
-    /// Tool pose in the base frame.
-    pub tool_b: Pose,
-    /// Arm joint angles, rad.
-    pub joints: [f64; ARM_DOFS],
-    /// Positions of the left and right finger, m: 0 (closed) to 0.04.
-    pub fingers: [f64; 2],
-    /// Gripper width as policies measure it, m.
-    pub sensed_width_m: f64,
-}
-
 /// Configuration of a body.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum BodyConfiguration<'a> {
@@ -556,8 +523,8 @@ pub struct StateRecording {
     pub sensors: Sensors,
     /// The settled state and the state after each control step.
     pub frames: Vec<WorldSnapshot>,
-    /// Torques of the arm's drives in these states, N m; see [`RobotState::joint_torques`](softvt_policy::RobotState).
-    pub joint_torques: Vec<[f64; ARM_DOFS]>,
+    /// Readings of the robot's own sensors in these states.
+    pub robot: Vec<RobotState>,
     /// The target, as an object of `sensors`.
     pub target: usize,
     /// Deformation in these states; `None` for rigid targets.

@@ -50,7 +50,7 @@ fn observation(step: usize) -> Observation {
         ee_position_b: position(step),
         ee_axis_angle_b: rotation::axis_angle(&orientation(step)),
         joints: joint_positions(step),
-        ..RobotState::ORIGIN
+        ..RobotState::default()
     };
     let (cameras, past, force_history) = (Vec::new(), Vec::new(), Vec::new());
     let (prompt, time_s) = (String::new(), 0.05 * step as f64);

@@ -4,18 +4,19 @@ use std::sync::Arc;
 
 use mlua::{Lua, Table, Value};
 
-use super::{image::LuaImage, pose::wxyz};
+use super::image::LuaImage;
 use crate::{
     schema::{
         FieldValue, Range, Type, class,
-        object::{MEASURED, fixed_list},
+        object::{Access, IntoFieldValue, LuaField, MEASURED, fixed_list},
         output,
     },
     vm::error::fail,
 };
 use softvt_common::text::unknown_name;
-use softvt_policy::{EpisodeBrief, Observation, PadForce, TactileFrame, TactileHistory};
-use softvt_robot::rotation;
+use softvt_policy::{
+    EpisodeBrief, Observation, PadForce, ROBOT_STREAMS, RobotStream, TactileFrame, TactileHistory,
+};
 use softvt_sensing::tactile::{MarkerFlow, MarkerPositions, Markers};
 
 /// `softvt.Observation`.
@@ -35,6 +36,42 @@ impl LuaObservation {
         self.observation.tactile.as_ref().ok_or_else(|| not_observed(lua, key, "tactile = true"))
     }
 }
+
+impl LuaObservation {
+    /// Numbers of a stream of the robot, by its index among those with a field.
+    fn robot_stream(&self, lua: &Lua, index: usize) -> mlua::Result<FieldValue> {
+        let Some((stream, field)) = robot_fields().nth(index) else {
+            return Ok(FieldValue::Value(Value::Nil));
+        };
+        if stream.is_drive && !self.drives {
+            return Err(not_observed(lua, field, "drives = true"));
+        }
+        match &(stream.read)(&self.observation.robot)[..] {
+            [number] => (*number).into_field_value(lua),
+            numbers => Ok(FieldValue::Numbers(numbers.to_vec())),
+        }
+    }
+}
+
+/// The streams of the robot that are fields of observations, with the names of the fields.
+fn robot_fields() -> impl Iterator<Item = (&'static RobotStream, &'static str)> {
+    ROBOT_STREAMS.iter().filter_map(|stream| Some((stream, stream.field?)))
+}
+
+const ROBOT_FIELDS: &[LuaField] = &{
+    let mut fields = [LuaField { name: "", access: Access::Read("", None), doc: "" }; RobotStream::FIELDS];
+    let (mut at, mut index) = (0, 0);
+    while index < ROBOT_STREAMS.len() {
+        let stream = &ROBOT_STREAMS[index];
+        if let Some(name) = stream.field {
+            let lua_type = if stream.width == 1 { "number" } else { "number[]" };
+            fields[at] = LuaField { name, access: Access::Read(lua_type, None), doc: stream.about };
+            at += 1;
+        }
+        index += 1;
+    }
+    fields
+};
 
 /// The error for data that was not computed, since the policy does not declare it.
 fn not_observed(lua: &Lua, key: &str, declaration: &str) -> mlua::Error {
@@ -71,35 +108,18 @@ output! {
 
 class! {
     /// The observation of a policy at a control step. Poses are of the tool centre point in the robot's base frame. The
-    /// true state of the scene is not part of it.
+    /// true state of the scene is not part of it. Its closure requires observes.drives.
     LuaObservation: "softvt.Observation" {
         label(_) { "obs".to_owned() }
         fields {
             /// Time since the policy took over, s.
             time: "number" { get(_, this) { this.observation.time_s } }
-            /// Tool position, m.
-            position: "number[]" { get(_, this) { this.observation.robot.ee_position_b } }
-            /// Tool orientation as axis-angle, rad, continuous along the episode: its length may exceed π.
-            axis_angle: "number[]" { get(_, this) { this.observation.robot.ee_axis_angle_b } }
-            /// Tool orientation as quaternion w, x, y, z with w ≥ 0.
-            quaternion: "number[]" { get(_, this) { wxyz(&rotation::from_axis_angle(&this.observation.robot.ee_axis_angle_b)) } }
-            /// The seven joint angles of the arm, rad.
-            joints: "number[]" { get(_, this) { this.observation.robot.joints } }
             /// Measured distance of the gels, 0 to 0.08 m, with the steps and the offset of a real hand; exact with
             /// observes.drives.
             width: "number" {
                 get(_, this) {
                     let robot = &this.observation.robot;
                     if this.drives { robot.gripper_width_m } else { robot.sensed_width_m }
-                }
-            }
-            /// Last commanded closure, 0 open to 1 closed; requires observes.drives.
-            closure: "number" {
-                get(lua, this) {
-                    if !this.drives {
-                        return Err(not_observed(lua, "closure", "drives = true"));
-                    }
-                    this.observation.robot.closure
                 }
             }
             /// The instruction.
@@ -126,6 +146,7 @@ class! {
                 }
             }
         }
+        declared ROBOT_FIELDS { get(lua, this, index) { this.robot_stream(lua, index)? } }
         methods {
             /// Returns the image of a camera in observes.cameras, 224 × 224 unless the scene defines another size.
             fn camera(lua, this, name: String) -> ["softvt.Image"] {

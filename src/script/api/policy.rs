@@ -1,12 +1,15 @@
 //! Policies and profiles: the tables that their files return.
 
-use mlua::Function;
+use mlua::{Function, Lua, Value};
 
-use crate::schema::{Range, Record, RecordType, Type, choice, record, record_of};
+use crate::{
+    schema::{FromChecked, LuaType, Range, Record, RecordType, Type, choice, record, record_of},
+    vm::error::fail,
+};
 use softvt_policy::{
-    GripHysteresis, SensorStreams,
+    GripHysteresis, RobotStream, SensorStreams, StatePart,
     decode::MAX_CHUNK_LEN,
-    profile::{GripCode, MAX_FRAMES, RobotStatePart},
+    profile::{GripCode, MAX_FRAMES},
 };
 use softvt_robot::Side;
 use softvt_sensing::tactile::{MarkerStyle, TactileMosaicLayout};
@@ -71,7 +74,7 @@ record! {
         /// (quaternions), 7 (joints, joint_velocities, joint_torques), 2 (finger_pair) and 1. The sensed width has the
         /// steps and the offset of a real hand; the gap between the exact one and the commanded closure is the grip
         /// force.
-        parts: Option<Vec<RobotStatePart>>;
+        parts: Option<Vec<StatePart>>;
         /// Number of control steps in the entry, the present one last, along a first axis; not for prompt and
         /// tactile_image. By default the present step without that axis, and 8 steps of marker_motion and force. The
         /// start of an episode repeats its first step.
@@ -193,16 +196,17 @@ choice! {
 }
 choice! { MarkerStyle { "dots" => Dots, "arrows" => Arrows, "black_arrows" => BlackArrows } }
 choice! { TactileMosaicLayout { "rows" => Rows, "columns" => Columns } }
-choice! {
-    RobotStatePart {
-        "position" => Position, "axis_angle" => AxisAngle,
-        "quaternion_wxyz" => QuaternionWxyz, "quaternion_xyzw" => QuaternionXyzw,
-        "joints" => Joints, "joint_velocities" => JointVelocities, "joint_torques" => JointTorques,
-        "gripper_width" => GripperWidth, "finger_position" => FingerPosition,
-        "sensed_width" => SensedWidth, "sensed_finger_position" => SensedFingerPosition,
-        "finger_pair" => FingerPair, "closure" => Closure,
+impl FromChecked for StatePart {
+    fn from_checked(value: Value, lua: &Lua) -> mlua::Result<Self> {
+        let name: String = lua.unpack(value)?;
+        Self::named(&name).ok_or_else(|| fail(lua, format!("unexpected {name:?}")))
     }
 }
+
+impl LuaType for StatePart {
+    const TYPE: Type = Type::Choice(RobotStream::PARTS);
+}
+
 choice! {
     /// The meaning of the numbers of an action before that of the gripper.
     enum PoseKind {

@@ -19,6 +19,8 @@ pub(crate) struct Class {
     pub name: &'static str,
     pub doc: &'static str,
     pub fields: &'static [LuaField],
+    /// Fields that are read-only and declared elsewhere, such as the streams of the robot.
+    pub declared: &'static [LuaField],
     pub methods: &'static [Signature],
 }
 
@@ -44,12 +46,17 @@ impl Class {
         self.name.rsplit('.').next().unwrap_or(self.name)
     }
 
+    /// All fields.
+    pub(crate) fn all_fields(&self) -> impl Iterator<Item = &'static LuaField> + Clone + use<> {
+        self.fields.iter().chain(self.declared)
+    }
+
     fn keys(&self) -> impl Iterator<Item = &'static str> + Clone + use<> {
-        self.fields.iter().map(|field| field.name).chain(self.methods.iter().map(|method| method.name))
+        self.all_fields().map(|field| field.name).chain(self.methods.iter().map(|method| method.name))
     }
 
     fn field(&self, name: &str) -> Option<usize> {
-        self.fields.iter().position(|field| field.name == name)
+        self.all_fields().position(|field| field.name == name)
     }
 
     /// The error for a name that is neither a field nor a method.
@@ -155,15 +162,20 @@ pub(crate) trait ApiObject: Clone + Send + Sync + UserData + FromLua + 'static {
     /// Name of the class, on which types in its own description may depend.
     const NAME: &'static str;
     const CLASS: &'static Class;
-    /// One per field of the class.
+    /// One per field of the class that is not declared elsewhere.
     const GETTERS: &'static [Getter<Self>];
-    /// One per field of the class; `None` for those that are read-only.
+    /// The same; `None` for those that are read-only.
     const SETTERS: &'static [Option<Setter<Self>>];
     /// One per method of the class that is not implemented in Lua.
     const METHODS: &'static [Method<Self>];
 
     /// Name in messages: `scene:camera("wrist")`.
     fn label(&self) -> String;
+
+    /// Value of a field that is declared elsewhere; nil if there is none of this index.
+    fn declared_field(&self, _: &Lua, _: usize) -> mlua::Result<FieldValue> {
+        Ok(FieldValue::Value(Value::Nil))
+    }
 
     /// Result of `tostring`.
     fn text(&self) -> String {
@@ -184,6 +196,7 @@ pub(crate) trait ApiObject: Clone + Send + Sync + UserData + FromLua + 'static {
 ///             name: "LuaCATS type" { get(lua, this) { … } }
 ///             name: "LuaCATS type" or "how to change it instead" { get(lua, this) { … } }
 ///         }
+///         declared FIELDS { get(lua, this, index) { … } }          // read-only, declared elsewhere
 ///         writable {
 ///             /// Documentation.
 ///             name: Type::… => path.to.field;                  // of the target of RustType::read and RustType::change
@@ -216,6 +229,9 @@ macro_rules! class {
                     get($read_lua:pat_param, $read_this:pat_param) $read_get:block
                 }
             )*})?
+            $(declared $declared:path {
+                get($declared_lua:pat_param, $declared_this:pat_param, $index:pat_param) $declared_get:block
+            })?
             $(writable {$(
                 $(#[doc = $write_doc:literal])+
                 $write:ident : $write_type:expr => $($($path:ident).+ ;)? $({
@@ -259,6 +275,7 @@ macro_rules! class {
                         doc: concat!($($write_doc),+),
                     },)*)?
                 ],
+                declared: $crate::schema::convert::first!($($declared,)? &[]),
                 methods: &[
                     $($($crate::schema::function::signature!(
                         [$($method_doc)*] $method($($arg : $arg_type $(= $arg_lua)?),*)
@@ -326,6 +343,15 @@ macro_rules! class {
                 let $text_this = self;
                 $text
             })?
+
+            $(fn declared_field(
+                &self,
+                lua: &mlua::Lua,
+                index: usize,
+            ) -> mlua::Result<$crate::schema::object::FieldValue> {
+                let ($declared_lua, $declared_this, $index) = (lua, self, index);
+                $crate::schema::object::IntoFieldValue::into_field_value($declared_get, lua)
+            })?
         }
 
         impl mlua::FromLua for $object {
@@ -389,14 +415,18 @@ fn read<T: ApiObject>(lua: &Lua, this: &T, key: &Value) -> mlua::Result<Value> {
     let Some(index) = T::CLASS.field(&name) else {
         return Err(T::CLASS.unknown_key_error(lua, &this.label(), &name));
     };
-    let get = T::GETTERS[index];
+    let get = move |lua: &Lua, this: &T| match T::GETTERS.get(index) {
+        Some(get) => get(lua, this),
+        None => this.declared_field(lua, index - T::GETTERS.len()),
+    };
+    let set = T::SETTERS.get(index).copied().flatten();
     let label = || format!("{}.{name}", this.label());
     let list = match get(lua, this)? {
         FieldValue::Value(value) => return Ok(value),
         FieldValue::Fixed(entries, hint) => LuaList::fixed(label(), entries, hint),
-        FieldValue::Numbers(numbers) if T::SETTERS[index].is_none() => {
-            let hint = match T::CLASS.fields[index].access {
-                Access::Read(_, Some(hint)) => hint,
+        FieldValue::Numbers(numbers) if set.is_none() => {
+            let hint = match T::CLASS.all_fields().nth(index).map(|field| field.access) {
+                Some(Access::Read(_, Some(hint))) => hint,
                 _ => MEASURED,
             };
             LuaList::fixed(label(), lua.create_sequence_from(numbers)?, hint)
@@ -425,7 +455,7 @@ fn write<T: ApiObject>(lua: &Lua, this: &T, key: &Value, value: &Value) -> mlua:
             format!("{label}.{name}: is a method and cannot be written; call it as {label}:{name}(…)");
         return Err(fail(lua, message));
     }
-    let writable = class.fields.iter().filter(|field| matches!(field.access, Access::Write(_)));
+    let writable = class.all_fields().filter(|field| matches!(field.access, Access::Write(_)));
     let names = writable.map(|field| field.name);
     Err(match names.clone().next() {
         Some(_) => fail(lua, format!("{label}: {}", unknown_name("key", &name, names))),
@@ -435,9 +465,9 @@ fn write<T: ApiObject>(lua: &Lua, this: &T, key: &Value, value: &Value) -> mlua:
 
 /// Checks a value and passes it to the setter of a field.
 fn write_field<T: ApiObject>(lua: &Lua, this: &T, index: usize, value: &Value) -> mlua::Result<()> {
-    let field = &T::CLASS.fields[index];
+    let Some(field) = T::CLASS.all_fields().nth(index) else { return Ok(()) };
     let label = format!("{}.{}", this.label(), field.name);
-    match (&field.access, T::SETTERS[index]) {
+    match (&field.access, T::SETTERS.get(index).copied().flatten()) {
         (Access::Write(ty), Some(set)) => {
             let value = ty.check(lua, value).map_err(|error| fail(lua, error.describe(&label)))?;
             set(lua, this, value)

@@ -44,7 +44,7 @@ pub(super) fn observation() -> Observation {
             gripper_width_m: 0.0625,
             sensed_width_m: 0.0624,
             closure: 0.25,
-            ..RobotState::ORIGIN
+            ..RobotState::default()
         },
         prompt: "take it".into(),
         cameras: vec![Arc::new(CameraImage { name: "wrist".into(), image, depth: None, segmentation: None })],

@@ -25,7 +25,7 @@ fn script() -> String {
     let mut text = String::from("NAMES = {\n");
     for class in api::CLASSES {
         let methods = quoted(class.methods.iter().map(|method| method.name));
-        let fields = quoted(class.fields.iter().map(|field| field.name));
+        let fields = quoted(class.all_fields().map(|field| field.name));
         let _ = writeln!(
             text,
             "  [{:?}] = {{ methods = {{ {methods} }}, fields = {{ {fields} }} }},",

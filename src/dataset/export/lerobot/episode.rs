@@ -12,12 +12,12 @@ use crate::{
     DatasetError,
     export::{
         ExportJob,
-        demo_reader::{DemoNumbers, DemoReader, MARKER_ROW, MARKER_SHAPE},
-        selection::{IMAGE_FEATURES, SelectedDemo},
+        demo_reader::DemoReader,
+        features::{Content, Feature, MARKER_ROW, MARKER_SHAPE},
+        selection::SelectedDemo,
     },
 };
 use softvt_benchmark::CONTROL_HZ;
-use softvt_robot::panda::ARM_DOFS;
 use softvt_sensing::camera::encode_png;
 
 /// Resolution and range of the counts from which quantiles of marker positions are taken, px.
@@ -25,7 +25,7 @@ const MARKER_STEP: f64 = 0.01;
 const MARKER_RANGE: f64 = 400.0;
 
 /// Writes the files of a layout, episode by episode.
-pub(super) trait EpisodeWriter: Send {
+pub(super) trait LerobotEpisodeWriter: Send {
     fn add(&mut self, episode: EpisodeData<'_>) -> Result<(), DatasetError>;
     fn finish(self: Box<Self>) -> Result<(), DatasetError>;
 }
@@ -47,17 +47,16 @@ impl<'a> EpisodeData<'a> {
     /// A stream is missing, of unexpected shape or not finite; or the export was cancelled.
     pub(super) fn read(
         job: &ExportJob<'_>,
+        features: &[Feature],
         version: LeRobotVersion,
         index: usize,
         demo: &'a SelectedDemo,
     ) -> Result<Self, DatasetError> {
         let steps = demo.entry.num_samples;
         let reader = DemoReader::open(demo)?;
-        let length = job.config.control.vector_length();
-        let DemoNumbers { state, actions, markers, joint_torques } = reader.numbers(job)?;
-        let mut images = IMAGE_FEATURES.map(|_| ImageColumn::new());
+        let mut images = [(); 3].map(|()| Some(ImageColumn::new()));
         reader.for_each_step(job, |step, step_images| {
-            let mut columns = images.iter_mut().zip(&step_images);
+            let mut columns = images.iter_mut().flatten().zip(&step_images);
             columns.try_for_each(|(column, image)| column.push(image, version.image_name(step)))
         })?;
         let timestamps: Vec<f32> =
@@ -68,20 +67,26 @@ impl<'a> EpisodeData<'a> {
             [counted(0), constant(index), counted(demo.first_frame), constant(demo.prompt)];
 
         let mut episode = Self { index, demo, columns: Vec::new(), statistics: Vec::new() };
-        let key = |name| version.key(name);
-        for (name, ImageColumn { images, counts }) in IMAGE_FEATURES.into_iter().zip(images) {
-            let parts = counts.into_iter().map(ValueStatistics::counted).collect();
-            episode.push(key(name), &[3, 1, 1], parts, ColumnValues::Images(images));
-        }
-        episode.push_vectors(key("state"), length, state);
-        episode.push_vectors(key("actions"), length, actions);
-        let (shape, parts) = match version {
-            LeRobotVersion::V21 => (&MARKER_SHAPE[..], statistics_per_marker(&markers)),
-            LeRobotVersion::V30 => (&[2][..], statistics_of_all_markers(&markers)),
-        };
-        episode.push(key("tactile_marker_motion"), shape, parts, ColumnValues::F32(markers));
-        if let Some(torques) = joint_torques {
-            episode.push_vectors(key("joint_torques"), ARM_DOFS, torques);
+        for feature in features {
+            let Some(key) = version.key(feature) else { continue };
+            match feature.content {
+                Content::Image(index) => {
+                    let Some(ImageColumn { images, counts }) = images[index].take() else { continue };
+                    let parts = counts.into_iter().map(ValueStatistics::counted).collect();
+                    episode.push(key, &[3, 1, 1], parts, ColumnValues::Images(images));
+                }
+                Content::Markers => {
+                    let markers = reader.numbers(job, feature)?;
+                    let (shape, parts) = match version {
+                        LeRobotVersion::V21 => (&MARKER_SHAPE[..], statistics_per_marker(&markers)),
+                        LeRobotVersion::V30 => (&[2][..], statistics_of_all_markers(&markers)),
+                    };
+                    episode.push(key, shape, parts, ColumnValues::F32(markers));
+                }
+                Content::Vector | Content::Action => {
+                    episode.push_vectors(key, feature.shape[0], reader.numbers(job, feature)?);
+                }
+            }
         }
         let part = |numbers: Vec<f64>| vec![ValueStatistics::of(numbers)];
         let seconds = timestamps.iter().map(|time| f64::from(*time)).collect();

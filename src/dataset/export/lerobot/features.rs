@@ -1,4 +1,4 @@
-//! Features of a row: for LeRobot's `info.json`, for Hugging Face's `datasets`, and as table columns.
+//! Columns of the rows: for LeRobot's `info.json`, for Hugging Face's `datasets`, and as table columns.
 
 use parquet::file::metadata::KeyValue;
 use serde_json::{Map, Value, json};
@@ -7,59 +7,37 @@ use super::{
     parquet_table::{ColumnType, ParquetColumn, TableSchema},
     version::LeRobotVersion,
 };
-use crate::export::{
-    ExportJob,
-    demo_reader::MARKER_SHAPE,
-    selection::{IMAGE_FEATURES, ImageSize},
-};
-use softvt_policy::profile::JOINT_NAMES;
+use crate::export::features::{Content, Feature};
 
 /// Index features of a row, in order: the last ones.
 pub(super) const INDEX_FEATURES: [&str; 4] = ["frame_index", "episode_index", "index", "task_index"];
 
-/// A feature.
+/// A column of the rows.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Feature {
+pub(super) struct Column {
     /// Its key in this version.
     pub name: &'static str,
     /// Type in LeRobot's terms.
-    pub dtype: &'static str,
+    dtype: &'static str,
     /// Shape per row.
-    pub shape: Vec<usize>,
+    shape: Vec<usize>,
     /// Names of its numbers or axes.
     names: Value,
 }
 
-/// All features in order; those that LeRobot adds to every dataset come last.
-pub(super) fn all(job: &ExportJob<'_>, version: LeRobotVersion) -> Vec<Feature> {
-    let control = job.config.control;
-    let vector = [control.vector_length()];
-    let feature = |name, dtype, shape: &[usize], names| Feature {
-        name: version.key(name),
-        dtype,
-        shape: shape.to_vec(),
-        names,
-    };
-    let images = IMAGE_FEATURES.into_iter().zip(job.selection.feature_sizes());
-    let images = images.map(|(name, ImageSize { height, width })| {
-        feature(name, "image", &[height, width, 3], json!(["height", "width", "channel"]))
+/// All columns in order; those that LeRobot adds to every dataset come last.
+pub(super) fn all(features: &[Feature], version: LeRobotVersion) -> Vec<Column> {
+    let own = features.iter().filter_map(|feature| {
+        let dtype = if matches!(feature.content, Content::Image(_)) { "image" } else { "float32" };
+        let (shape, names) = (feature.shape.clone(), feature.components.clone());
+        Some(Column { name: version.key(feature)?, dtype, shape, names })
     });
-    let with = |last: &'static str| json!(control.motion_names().iter().chain([&last]).collect::<Vec<_>>());
-    let own = [
-        feature("state", "float32", &vector, with("finger")),
-        feature("actions", "float32", &vector, with("closure")),
-        feature("tactile_marker_motion", "float32", &MARKER_SHAPE, json!(["time", "marker", "xy"])),
-    ];
-    let torques = job
-        .selection
-        .has_joint_torques
-        .then(|| feature("joint_torques", "float32", &[JOINT_NAMES.len()], json!(JOINT_NAMES)));
-    let timestamp = feature("timestamp", "float32", &[1], Value::Null);
-    let numbered = INDEX_FEATURES.map(|name| feature(name, "int64", &[1], Value::Null));
-    images.chain(own).chain(torques).chain([timestamp]).chain(numbered).collect()
+    let single = |name, dtype| Column { name, dtype, shape: vec![1], names: Value::Null };
+    let numbered = INDEX_FEATURES.map(|name| single(name, "int64"));
+    own.chain([single("timestamp", "float32")]).chain(numbered).collect()
 }
 
-impl Feature {
+impl Column {
     fn is_image(&self) -> bool {
         self.dtype == "image"
     }
@@ -89,19 +67,19 @@ impl Feature {
 }
 
 /// The `features` of `info.json`.
-pub(super) fn info(features: &[Feature]) -> Value {
+pub(super) fn info(features: &[Column]) -> Value {
     let entry =
-        |f: &Feature| (f.name.to_owned(), json!({ "dtype": f.dtype, "shape": f.shape, "names": f.names }));
+        |f: &Column| (f.name.to_owned(), json!({ "dtype": f.dtype, "shape": f.shape, "names": f.names }));
     Value::Object(features.iter().map(entry).collect())
 }
 
 /// Schema of the tables of rows. Their metadata are those that `datasets` expects: without them, images are read as
 /// bytes.
-pub(super) fn schema(features: &[Feature]) -> TableSchema {
+pub(super) fn schema(features: &[Column]) -> TableSchema {
     let known: Map<String, Value> = features.iter().map(|f| (f.name.to_owned(), f.hugging_face())).collect();
     let text = json!({ "info": { "features": known } }).to_string();
     TableSchema {
-        columns: features.iter().map(Feature::column).collect(),
+        columns: features.iter().map(Column::column).collect(),
         metadata: vec![KeyValue::new("huggingface".to_owned(), text)],
     }
 }

@@ -6,7 +6,7 @@ use parquet::file::metadata::KeyValue;
 use serde_json::{Value, json};
 
 use super::{
-    features::{self, Feature},
+    features::{self, Column},
     parquet_table::{ColumnType, ColumnValues, ParquetColumn, ParquetTable},
     version::{CHUNK, LeRobotVersion, MAX_TABLE_MB},
 };
@@ -15,6 +15,7 @@ use crate::{
     export::{
         ExportJob, ExportSummary,
         description::{self, FormatText},
+        features::Feature,
         selection::{SelectedDemo, Selection},
     },
 };
@@ -25,7 +26,7 @@ use softvt_common::files;
 pub(super) fn write(
     job: &ExportJob<'_>,
     version: LeRobotVersion,
-    features: &[Feature],
+    features: &[Column],
 ) -> Result<(), DatasetError> {
     let ExportJob { dir, selection, .. } = job;
     match version {
@@ -38,7 +39,7 @@ pub(super) fn write(
     Ok(files::write_json(&dir.join("meta/info.json"), &info(version, features, selection.summary()))?)
 }
 
-fn info(version: LeRobotVersion, features: &[Feature], summary: ExportSummary) -> Value {
+fn info(version: LeRobotVersion, features: &[Column], summary: ExportSummary) -> Value {
     let ExportSummary { episodes, frames, tasks } = summary;
     let mut info = json!({
         "codebase_version": version.code(),
@@ -127,8 +128,7 @@ fn readme(job: &ExportJob<'_>, version: LeRobotVersion) -> String {
         &FormatText {
             hub: "tags:\n- LeRobot\nconfigs:\n- config_name: default\n  data_files: data/*/*.parquet\n",
             name: &format!("LeRobot {}", version.code()),
-            key: |name| version.key(name).to_owned(),
-            more_keys: "",
+            key: |feature: &Feature| version.key(feature).map(str::to_owned),
             files: encoding,
         },
     )

@@ -10,11 +10,11 @@ mod v30;
 mod version;
 
 use self::{
-    episode::{EpisodeData, EpisodeWriter},
+    episode::{EpisodeData, LerobotEpisodeWriter},
     v21::EpisodeTableWriter,
     v30::SharedTableWriter,
 };
-use super::ExportJob;
+use super::{ExportJob, features as export_features};
 use crate::DatasetError;
 
 pub use version::LeRobotVersion;
@@ -28,17 +28,18 @@ pub(super) fn write(
     version: LeRobotVersion,
     on_episode: &mut dyn FnMut(usize, &str),
 ) -> Result<(), DatasetError> {
-    let features = features::all(job, version);
-    let schema = features::schema(&features);
-    let mut writer: Box<dyn EpisodeWriter> = match version {
+    let features = export_features::all(job);
+    let columns = features::all(&features, version);
+    let schema = features::schema(&columns);
+    let mut writer: Box<dyn LerobotEpisodeWriter> = match version {
         LeRobotVersion::V21 => Box::new(EpisodeTableWriter::create(job.dir, schema)?),
         LeRobotVersion::V30 => Box::new(SharedTableWriter::create(job.dir, schema)?),
     };
     job.for_each_episode(
-        |index, demo| EpisodeData::read(job, version, index, demo),
+        |index, demo| EpisodeData::read(job, &features, version, index, demo),
         |episode| writer.add(episode),
         on_episode,
     )?;
     writer.finish()?;
-    meta::write(job, version, &features)
+    meta::write(job, version, &columns)
 }

@@ -11,7 +11,7 @@ use serde::Serialize;
 use serde_json::json;
 
 use super::{
-    episode::{EpisodeData, EpisodeWriter},
+    episode::{EpisodeData, LerobotEpisodeWriter},
     parquet_table::{ParquetTable, TableSchema},
     statistics::{FeatureStatistics, NestedList},
     version::CHUNK,
@@ -70,7 +70,7 @@ impl EpisodeTableWriter {
     }
 }
 
-impl EpisodeWriter for EpisodeTableWriter {
+impl LerobotEpisodeWriter for EpisodeTableWriter {
     fn add(&mut self, episode: EpisodeData<'_>) -> Result<(), DatasetError> {
         let (index, steps) = (episode.index, episode.demo.entry.num_samples);
         let line = json!({ "episode_index": index, "tasks": [episode.demo.entry.language], "length": steps });

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use serde_json::{Map, Value, json};
 
 use super::{
-    episode::{EpisodeData, EpisodeWriter},
+    episode::{EpisodeData, LerobotEpisodeWriter},
     parquet_table::{ColumnType, ColumnValues, ParquetColumn, ParquetTable, TableSchema},
     statistics::{FeatureStatistics, Figure, NestedList},
     version::{CHUNK, MAX_TABLE_MB},
@@ -102,7 +102,7 @@ impl SharedTableWriter {
     }
 }
 
-impl EpisodeWriter for SharedTableWriter {
+impl LerobotEpisodeWriter for SharedTableWriter {
     fn add(&mut self, episode: EpisodeData<'_>) -> Result<(), DatasetError> {
         let EpisodeData { index, demo, columns, statistics } = episode;
         let steps = demo.entry.num_samples;

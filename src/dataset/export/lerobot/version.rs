@@ -1,5 +1,7 @@
 //! [`LeRobotVersion`], and constants of the two layouts.
 
+use crate::export::features::Feature;
+
 /// Version of LeRobot's dataset layout.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum LeRobotVersion {
@@ -23,20 +25,12 @@ impl LeRobotVersion {
         }
     }
 
-    /// Key of a feature whose name in openpi's and SoftVTBench's data is `name`: v3.0 has those that LeRobot's own
-    /// policies look for.
-    pub(super) fn key(self, name: &'static str) -> &'static str {
-        match (self, name) {
-            (Self::V21, _) => name,
-            (Self::V30, "image") => "observation.images.third_person",
-            (Self::V30, "wrist_image") => "observation.images.wrist",
-            (Self::V30, "tactile_image") => "observation.images.tactile_image",
-            (Self::V30, "state") => "observation.state",
-            (Self::V30, "tactile_marker_motion") => "observation.tactile_marker_motion",
-            (Self::V30, "joint_torques") => "observation.joint_torques",
-            (Self::V30, "actions") => "action",
-            // Those that LeRobot adds to every dataset.
-            (Self::V30, _) => name,
+    /// Key of a feature; `None` if LeRobot's data do not have it.
+    pub(super) fn key(self, feature: &Feature) -> Option<&'static str> {
+        match self {
+            _ if feature.lerobot.is_empty() => None,
+            Self::V21 => Some(feature.name),
+            Self::V30 => Some(feature.lerobot),
         }
     }
 

@@ -7,8 +7,9 @@ use crate::{
     DatasetError,
     export::{
         ExportJob,
-        demo_reader::{DemoNumbers, DemoReader},
-        selection::{IMAGE_FEATURES, SelectedDemo},
+        demo_reader::DemoReader,
+        features::{self, Content},
+        selection::SelectedDemo,
     },
 };
 use softvt_sensing::camera::encode_png;
@@ -23,30 +24,34 @@ const MAX_RECORD: usize = i32::MAX as usize;
 /// A stream is missing, of unexpected shape or not finite; the record is too large; or the export was cancelled.
 pub(super) fn read(job: &ExportJob<'_>, demo: &SelectedDemo) -> Result<Vec<u8>, DatasetError> {
     let reader = DemoReader::open(demo)?;
-    let DemoNumbers { state, actions, markers, joint_torques } = reader.numbers(job)?;
-    let joints = reader.joint_positions()?;
-    let mut images = IMAGE_FEATURES.map(|_| Vec::new());
+    let mut images = [(); 3].map(|()| Vec::new());
     reader.for_each_step(job, |_, step_images| {
         for (files, image) in images.iter_mut().zip(&step_images) {
             files.push(encode_png(image)?);
         }
         Ok(())
     })?;
+    let mut observed = Vec::new();
+    for feature in features::all(job) {
+        observed.push(match feature.content {
+            Content::Image(index) => (
+                format!("steps/observation/{}", feature.name),
+                Feature::bytes(std::mem::take(&mut images[index])),
+            ),
+            Content::Action => ("steps/action".to_owned(), Feature::floats(reader.numbers(job, &feature)?)),
+            Content::Vector | Content::Markers => (
+                format!("steps/observation/{}", feature.name),
+                Feature::floats(reader.numbers(job, &feature)?),
+            ),
+        });
+    }
     let entry = &demo.entry;
     let steps = entry.num_samples;
     let is_last = |step: usize| step + 1 == steps;
     let flags =
         |is: &dyn Fn(usize) -> bool| Feature::integers((0..steps).map(|i| i64::from(is(i))).collect());
 
-    let observed = IMAGE_FEATURES.into_iter().zip(images.map(Feature::bytes));
-    let observed = observed.chain([
-        ("state", Feature::floats(state)),
-        ("joint_state", Feature::floats(joints)),
-        ("tactile_marker_motion", Feature::floats(markers)),
-    ]);
-    let observed = observed.chain(joint_torques.map(|torques| ("joint_torques", Feature::floats(torques))));
     let step = [
-        ("action", Feature::floats(actions)),
         ("discount", Feature::floats(vec![1.0; steps])),
         ("reward", Feature::floats((0..steps).map(|step| f32::from(u8::from(is_last(step)))).collect())),
         ("is_first", flags(&|step| step == 0)),
@@ -63,10 +68,9 @@ pub(super) fn read(job: &ExportJob<'_>, demo: &SelectedDemo) -> Result<Vec<u8>, 
         ("asset_name", Feature::text(&entry.asset_name, 1)),
         ("success", Feature::integers(vec![i64::from(entry.success)])),
     ];
-    let observed = observed.map(|(name, feature)| (format!("steps/observation/{name}"), feature));
     let step = step.map(|(name, feature)| (format!("steps/{name}"), feature));
     let metadata = metadata.map(|(name, feature)| (format!("episode_metadata/{name}"), feature));
-    let example = Example::new(observed.chain(step).chain(metadata));
+    let example = Example::new(observed.into_iter().chain(step).chain(metadata));
     let bytes = example.encoded_len();
     if bytes > MAX_RECORD {
         let what = format!("its record has {bytes} bytes, and TensorFlow reads at most {MAX_RECORD}");

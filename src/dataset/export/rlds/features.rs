@@ -5,11 +5,8 @@ use serde_json::{Map, Value, json};
 
 use crate::export::{
     ExportJob,
-    demo_reader::MARKER_SHAPE,
-    description,
-    selection::{IMAGE_FEATURES, ImageSize},
+    features::{self, Content, Feature},
 };
-use softvt_robot::panda::ARM_DOFS;
 
 /// Features of an episode.
 pub(super) fn json(job: &ExportJob<'_>) -> Value {
@@ -21,33 +18,36 @@ pub(super) fn json(job: &ExportJob<'_>) -> Value {
 }
 
 fn steps(job: &ExportJob<'_>) -> Value {
-    let vector = [job.config.control.vector_length()];
-    dictionary([
-        ("observation", observation(job)),
-        ("action", floats(&vector, &description::action(job))),
-        ("discount", scalar("float32", "always 1")),
-        ("reward", scalar("float32", "1 in the last step, else 0")),
-        ("is_first", scalar("bool", "true in the first step")),
-        ("is_last", scalar("bool", "true in the last step")),
-        ("is_terminal", scalar("bool", "true in the last step, which reaches the goal")),
-        ("language_instruction", text("prompt of the task")),
-    ])
+    let (actions, observed): (Vec<_>, Vec<_>) =
+        features::all(job).into_iter().partition(|feature| feature.content == Content::Action);
+    dictionary(
+        [("observation", dictionary(observed.iter().map(|feature| (feature.name, described(feature)))))]
+            .into_iter()
+            .chain(actions.iter().map(|action| ("action", described(action))))
+            .chain([
+                ("discount", scalar("float32", "always 1")),
+                ("reward", scalar("float32", "1 in the last step, else 0")),
+                ("is_first", scalar("bool", "true in the first step")),
+                ("is_last", scalar("bool", "true in the last step")),
+                ("is_terminal", scalar("bool", "true in the last step, which reaches the goal")),
+                ("language_instruction", text("prompt of the task")),
+            ]),
+    )
 }
 
-fn observation(job: &ExportJob<'_>) -> Value {
-    let control = job.config.control;
-    let abouts = ["image of the third-person camera", "image of the wrist camera", description::MOSAIC];
-    let sizes = job.selection.feature_sizes();
-    let images = IMAGE_FEATURES.into_iter().zip(sizes.into_iter().zip(abouts));
-    let images = images.map(|(name, (size, about))| (name, png(size, about)));
-    let numbers = [
-        ("state", floats(&[control.vector_length()], &description::state(control))),
-        ("joint_state", floats(&[ARM_DOFS], description::JOINT_STATE)),
-        ("tactile_marker_motion", floats(&MARKER_SHAPE, description::MARKERS)),
-    ];
-    let has_torques = job.selection.has_joint_torques;
-    let torques = has_torques.then(|| ("joint_torques", floats(&[ARM_DOFS], description::TORQUES)));
-    dictionary(images.chain(numbers).chain(torques))
+fn described(feature: &Feature) -> Value {
+    match feature.content {
+        Content::Image(_) => json!({
+            "pythonClassName": class("image_feature.Image"),
+            "image": { "shape": dimensions(&feature.shape), "dtype": "uint8", "encodingFormat": "png" },
+            "description": feature.about,
+        }),
+        _ => json!({
+            "pythonClassName": class("tensor_feature.Tensor"),
+            "tensor": { "shape": dimensions(&feature.shape), "dtype": "float32", "encoding": "none" },
+            "description": feature.about,
+        }),
+    }
 }
 
 fn episode_metadata() -> Value {
@@ -77,22 +77,6 @@ fn dictionary(entries: impl IntoIterator<Item = (&'static str, Value)>) -> Value
 
 fn dimensions(shape: &[usize]) -> Value {
     json!({ "dimensions": shape.iter().map(usize::to_string).collect::<Vec<_>>() })
-}
-
-fn png(ImageSize { height, width }: ImageSize, about: &str) -> Value {
-    json!({
-        "pythonClassName": class("image_feature.Image"),
-        "image": { "shape": dimensions(&[height, width, 3]), "dtype": "uint8", "encodingFormat": "png" },
-        "description": about,
-    })
-}
-
-fn floats(shape: &[usize], about: &str) -> Value {
-    json!({
-        "pythonClassName": class("tensor_feature.Tensor"),
-        "tensor": { "shape": dimensions(shape), "dtype": "float32", "encoding": "none" },
-        "description": about,
-    })
 }
 
 fn scalar(dtype: &str, about: &str) -> Value {

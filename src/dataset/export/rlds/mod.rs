@@ -15,6 +15,7 @@ use self::tfrecord::{ShardWriter, Split};
 use super::{
     ExportJob,
     description::{self, FormatText},
+    features::{Content, Feature},
 };
 use crate::DatasetError;
 use softvt_common::files;
@@ -91,11 +92,12 @@ fn readme(job: &ExportJob<'_>, name: &str) -> String {
         &FormatText {
             hub: "tags:\n- RLDS\n",
             name: "RLDS",
-            key: |name| match name {
-                "actions" => "action".to_owned(),
-                name => format!("observation/{name}"),
+            key: |feature: &Feature| {
+                Some(match feature.content {
+                    Content::Action => "action".to_owned(),
+                    _ => format!("observation/{}", feature.name),
+                })
             },
-            more_keys: &format!("| `observation/joint_state` | {} |\n", description::JOINT_STATE),
             files,
         },
     )
