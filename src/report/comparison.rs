@@ -14,6 +14,7 @@ use super::{
 use softvt_common::text::{TextColumn, TextTable, counted, decimal, shortened};
 use softvt_evaluation::stage::TaskStage;
 use softvt_runs::{
+    measures::{MEASURES, Measure, MeasureGroup},
     paired_stats::{
         EpisodeKey, EpisodePair, PairedComparison, PairedDifference, PairedStages, group_by_task,
         pair_episodes,
@@ -420,27 +421,19 @@ pub(super) const COLUMNS: [TextColumn; 8] = {
     ]
 };
 
+/// Measures in the table without details.
+const MAIN_MEASURES: [&str; 5] = ["goal", "no_drop", "safety", "d_over_tau", "collapsed_volume_pct"];
+
 /// Appends the rows that only the table of all episodes has.
 fn push_details(table: &mut TextTable, deformable: bool, paired: &PairedComparison) {
-    let of_soft_targets = [
-        ("DSR, %", &paired.dsr, 1),
-        ("D peak, %", &paired.d_peak, 2),
-        ("D mean, %", &paired.d_mean, 2),
-        ("D final, %", &paired.d_final, 2),
-        ("D P95, %", &paired.d_p95, 2),
-        ("time over τ, s", &paired.time_over_tau_s, 2),
-        ("damaged, %", &paired.damaged_volume_pct, 1),
-    ];
-    let of_all = [
-        ("contact, %", &paired.contact_success, 1),
-        ("contact safety, %", &paired.contact_safety, 1),
-        ("gentle, %", &paired.gentle, 1),
-        ("grip ratio", &paired.grip_ratio, 1),
-        ("others within τ, %", &paired.others_ok, 1),
-        ("touched others, %", &paired.wrong_contact, 1),
-    ];
-    for (name, difference, digits) in of_soft_targets.into_iter().filter(|_| deformable).chain(of_all) {
-        push_difference(table, name, difference, digits);
+    let is_of_soft = |measure: &Measure| {
+        matches!(measure.group, MeasureGroup::Deformation | MeasureGroup::Volume) || measure.paired == Some("dsr")
+    };
+    let further = MEASURES.iter().filter(|measure| !MAIN_MEASURES.map(Some).contains(&measure.paired));
+    for measure in further.filter(|measure| deformable || !is_of_soft(measure)) {
+        if let Some(difference) = (measure.difference)(paired) {
+            push_difference(table, &measure.label(), &difference, measure.digits);
+        }
     }
     push_stages(table, &paired.failed_stages);
 }

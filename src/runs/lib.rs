@@ -12,6 +12,7 @@ pub mod attempts;
 pub mod experiment_folder;
 pub mod json_difference;
 pub mod manifest;
+pub mod measures;
 pub mod paired_stats;
 pub mod paired_tests;
 pub mod record;

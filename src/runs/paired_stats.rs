@@ -4,10 +4,11 @@
 //! seed, so that nothing else differs between them. Rates are compared by McNemar's exact test with the interval of
 //! Agresti and Min; deformations by the bootstrap of the mean difference.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 
 use serde::Serialize;
 
+pub use super::measures::PairedComparison;
 use super::{
     paired_tests::{e_value, mcnemar, signed_rank},
     record::EpisodeRecord,
@@ -64,134 +65,6 @@ pub fn group_by_task<'p, 'a>(pairs: &'p [EpisodePair<'a>]) -> impl Iterator<Item
         let (a, b) = (&a.first.header.id, &b.first.header.id);
         a.suite == b.suite && a.task == b.task
     })
-}
-
-/// Differences of the second run from the first. An invalid episode succeeds at nothing and has no deformation.
-///
-/// A quantity is compared over the pairs in which both episodes have it.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct PairedComparison {
-    /// Number of episodes that both runs have.
-    pub pairs: usize,
-    /// Number of those that are invalid in at least one run.
-    pub invalid_pairs: usize,
-    /// Goal Success, %.
-    pub goal: PairedDifference,
-    /// NoDrop, %.
-    pub no_drop: PairedDifference,
-    /// Safety Success, %; without pairs if all targets are soft and a run judged none of them.
-    pub safety: PairedDifference,
-    /// DSR: Goal Success with D_peak ≤ τ, %; over soft targets, without pairs if a run judged none of them.
-    pub dsr: PairedDifference,
-    /// Goal Success with contact of both pads throughout the carry, %.
-    pub contact_success: PairedDifference,
-    /// Contact success with Safety Success and NoSlip, %.
-    pub contact_safety: PairedDifference,
-    /// Goal Success with a gentle grip, %.
-    pub gentle: PairedDifference,
-    /// Largest force on a pad over the least that holds the target.
-    pub grip_ratio: PairedDifference,
-    /// No other soft body beyond its own τ, %; where both runs know it.
-    pub others_ok: PairedDifference,
-    /// Longest time for which a target was over its τ, s.
-    pub time_over_tau_s: PairedDifference,
-    /// Episodes in which the robot touched a movable object other than the target, %; invalid ones included.
-    pub wrong_contact: PairedDifference,
-    /// Stages at which episodes without Goal Success ended; invalid ones included.
-    pub failed_stages: PairedStages,
-    /// Mean D within the episode, %.
-    pub d_mean: PairedDifference,
-    /// D at the end of the episode, %.
-    pub d_final: PairedDifference,
-    /// 95th percentile of D within the episode, %.
-    pub d_p95: PairedDifference,
-    /// Largest share of the volume of a target beyond its collapse strain, %.
-    pub collapsed_volume_pct: PairedDifference,
-    /// Largest share of the volume of a target that was ever beyond its damage strain, %.
-    pub damaged_volume_pct: PairedDifference,
-    /// Largest peak D of a target where both runs have one, % of its diagonal.
-    pub d_peak: PairedDifference,
-    /// Peak D over τ where both runs have both.
-    pub d_over_tau: PairedDifference,
-    /// Metrics of the suite that both runs have, by name.
-    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
-    pub metrics: BTreeMap<String, PairedDifference>,
-}
-
-impl PairedComparison {
-    /// Compares the two episodes of each pair.
-    pub fn from_pairs(pairs: &[EpisodePair]) -> Self {
-        let rate = |test: fn(&EpisodeRecord) -> bool| {
-            let holds = |r: &EpisodeRecord| r.outcome.is_valid() && test(r);
-            PairedDifference::from_successes(pairs.iter().map(|pair| [holds(pair.first), holds(pair.second)]))
-        };
-        let mean = |value: fn(&EpisodeRecord) -> Option<f64>| {
-            let of_valid = |record: &EpisodeRecord| value(record).filter(|_| record.outcome.is_valid());
-            let both = |pair: &EpisodePair| Some([of_valid(pair.first)?, of_valid(pair.second)?]);
-            PairedDifference::from_values(pairs.iter().filter_map(both))
-        };
-        let soft: Vec<_> = pairs
-            .iter()
-            .filter(|pair| pair.first.has_soft_target() && pair.second.has_soft_target())
-            .collect();
-        // As in a summary: what was judged in no episode of a run has no rate.
-        let is_judged = soft.iter().any(|pair| pair.first.is_deformation_judged())
-            && soft.iter().any(|pair| pair.second.is_deformation_judged());
-        let judged = || soft.iter().filter(|_| is_judged);
-        let safety_rate = |test: fn(&EpisodeRecord) -> bool| match is_judged {
-            true => PairedDifference::from_successes(
-                judged().map(|pair| [pair.first, pair.second].map(|r| r.outcome.is_valid() && test(r))),
-            ),
-            false => PairedDifference::default(),
-        };
-        let names: BTreeSet<&String> =
-            pairs.iter().flat_map(|pair| pair.first.stats.metrics.keys()).collect();
-        let of_metric = |name: &String| {
-            let value = |r: &EpisodeRecord| {
-                r.stats.metrics.get(name).copied().flatten().filter(|_| r.outcome.is_valid())
-            };
-            let both = |pair: &EpisodePair| Some([value(pair.first)?, value(pair.second)?]);
-            PairedDifference::from_values(pairs.iter().filter_map(both))
-        };
-        let touches_other = |r: &EpisodeRecord| r.verdict.first_wrong_contact.is_some();
-        Self {
-            pairs: pairs.len(),
-            invalid_pairs: pairs
-                .iter()
-                .filter(|pair| !(pair.first.outcome.is_valid() && pair.second.outcome.is_valid()))
-                .count(),
-            goal: rate(|r| r.verdict.goal),
-            no_drop: rate(|r| r.verdict.no_drop),
-            safety: safety_rate(|r| r.verdict.safety),
-            dsr: PairedDifference::from_successes(
-                judged().map(|pair| [pair.first, pair.second].map(EpisodeRecord::is_deformation_safe)),
-            ),
-            contact_success: rate(|r| r.verdict.contact_success),
-            contact_safety: safety_rate(|r| r.verdict.contact_safety),
-            gentle: rate(|r| r.verdict.gentle),
-            grip_ratio: mean(|r| r.verdict.object().grip_ratio),
-            others_ok: PairedDifference::from_successes(
-                pairs
-                    .iter()
-                    .filter_map(|pair| Some([pair.first.verdict.others_ok?, pair.second.verdict.others_ok?])),
-            ),
-            time_over_tau_s: mean(EpisodeRecord::time_over_tau_s),
-            wrong_contact: PairedDifference::from_failures(
-                pairs.iter().map(|pair| [pair.first, pair.second].map(touches_other)),
-            ),
-            failed_stages: PairedStages::new(
-                pairs.iter().map(|pair| [pair.first, pair.second].map(|r| r.verdict.failed_stage)),
-            ),
-            d_mean: mean(|r| r.verdict.object().d_mean),
-            d_final: mean(|r| r.verdict.object().d_final),
-            d_p95: mean(|r| r.verdict.object().d_p95),
-            collapsed_volume_pct: mean(EpisodeRecord::collapsed_volume_pct),
-            damaged_volume_pct: mean(EpisodeRecord::damaged_volume_pct),
-            d_peak: mean(EpisodeRecord::d_peak),
-            d_over_tau: mean(EpisodeRecord::d_over_tau),
-            metrics: names.into_iter().map(|name| (name.clone(), of_metric(name))).collect(),
-        }
-    }
 }
 
 /// Stages at which the same episodes of two runs failed.

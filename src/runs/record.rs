@@ -368,6 +368,16 @@ impl EpisodeRecord {
         self.collapsed_volume_pct().filter(|pct| *pct >= CRUSHED_PCT)
     }
 
+    /// True if the object was crushed in an episode of the category "over the limit".
+    pub fn is_crushed_over_limit(&self) -> bool {
+        self.category() == EpisodeCategory::OverLimit && self.crushed_volume_pct().is_some()
+    }
+
+    /// A metric of the suite; `None` without a value.
+    pub fn metric(&self, name: &str) -> Option<f64> {
+        self.stats.metrics.get(name).copied().flatten()
+    }
+
     /// True if the episode counts in DSR: Goal Success with D_peak ≤ τ of each target. Drops do not enter.
     pub fn is_deformation_safe(&self) -> bool {
         self.outcome.is_valid() && self.verdict.goal && self.is_within_limits() == Some(true)

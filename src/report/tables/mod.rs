@@ -14,7 +14,10 @@ use softvt_evaluation::{
     stage::TaskStage,
     statistics::{Distribution, Rate},
 };
-use softvt_runs::summary::{EpisodeDeformation, GroupScores, TaskScores};
+use softvt_runs::{
+    measures::{MEASURES, Measure, MeasureGroup, Score},
+    summary::{GroupScores, TaskScores},
+};
 
 /// Number of columns, from the left, that hold text; the others hold numbers.
 pub(super) const TEXT_COLUMNS: usize = 2;
@@ -120,66 +123,96 @@ pub fn main_table(runs: &[RunSummary]) -> ResultTable {
     }
 }
 
+/// A column with a number of a distribution.
+type Statistic = (&'static str, fn(&Distribution) -> Option<f64>);
+
+const MEAN: Statistic = ("mean", |of| of.mean);
+const P5: Statistic = ("P5", |of| of.p5);
+const MEDIAN: Statistic = ("median", |of| of.median);
+const P95: Statistic = ("P95", |of| of.p95);
+
+/// Headings of the columns of measures: one for a rate or a mean, and one per statistic of a distribution.
+fn measure_head(scores: &GroupScores, measures: &[&Measure], statistics: &[Statistic]) -> Vec<String> {
+    let of = |measure: &&Measure| {
+        let mut name = measure.heading.to_owned();
+        name[..1].make_ascii_uppercase();
+        match (measure.score)(scores) {
+            Some(Score::Distribution(_)) => statistics.iter().map(|(of, _)| format!("{name}, {of}")).collect(),
+            _ => vec![name],
+        }
+    };
+    measures.iter().flat_map(of).collect()
+}
+
+/// Cells of a run below [`measure_head`].
+fn measure_cells(run: &RunSummary, measures: &[&Measure], statistics: &[Statistic]) -> Vec<String> {
+    let scores = &run.summary.scores;
+    let of = |measure: &&Measure| match (measure.score)(scores) {
+        Some(Score::Rate(of)) if measure.needs_limit => vec![soft_rate(run, scores, &of)],
+        Some(Score::Rate(of)) => vec![of.rate.map_or_else(|| "N/A".to_owned(), |_| rate(&of))],
+        Some(Score::Distribution(of)) => statistics.iter().map(|(_, value)| decimal(value(&of), 2)).collect(),
+        Some(Score::Mean(mean)) => vec![decimal(mean, 2)],
+        None => Vec::new(),
+    };
+    measures.iter().flat_map(of).collect()
+}
+
+/// The measures of a group with the number of episodes of one of them; `None` without a run.
+fn group_table(
+    runs: &[&RunSummary],
+    caption: &str,
+    group: MeasureGroup,
+    statistics: &[Statistic],
+    number: fn(&GroupScores) -> usize,
+) -> Option<ResultTable> {
+    let measures: Vec<&Measure> = Measure::of(group).collect();
+    let row = |run: &&RunSummary| {
+        let head = [run.summary.suite.clone(), run.method.clone()];
+        let cells = measure_cells(run, &measures, statistics);
+        head.into_iter().chain(cells).chain([number(&run.summary.scores).to_string()]).collect()
+    };
+    let head = measure_head(&runs.first()?.summary.scores, &measures, statistics);
+    let head = strings(["Suite", "Method"]).into_iter().chain(head).chain(["Episodes".to_owned()]);
+    Some(ResultTable {
+        caption: caption.to_owned(),
+        head: head.collect(),
+        rows: runs.iter().map(row).collect(),
+    })
+}
+
+fn soft(runs: &[RunSummary]) -> Vec<&RunSummary> {
+    runs.iter().filter(|run| run.is_soft()).collect()
+}
+
 /// The paper's deformation table; `None` if all suites are rigid.
 pub fn deformation_table(runs: &[RunSummary]) -> Option<ResultTable> {
+    let within: Vec<&Measure> = MEASURES.iter().filter(|measure| measure.within.is_some()).collect();
     let row = |run: &RunSummary| {
-        let scores = &run.summary.scores;
-        let Distribution { mean, p5, median, p95, n, invalid, .. } = scores.deformation;
-        let EpisodeDeformation { d_mean, d_final, d_p95, time_over_tau_s } = scores.within_episodes;
-        let head = [run.summary.suite.clone(), run.method.clone(), decimal(mean, 2)];
-        let percentiles = [p5, median, p95].map(|x| percentile(&scores.deformation, x));
-        let within = [d_mean, d_final, d_p95, time_over_tau_s].map(|x| decimal(x, 2));
-        let counts = [n.to_string(), invalid.to_string()];
-        head.into_iter().chain(percentiles).chain(counts).chain(within).collect()
+        let peaks = run.summary.scores.deformation;
+        let head = [run.summary.suite.clone(), run.method.clone(), decimal(peaks.mean, 2)];
+        let percentiles = [peaks.p5, peaks.median, peaks.p95].map(|x| percentile(&peaks, x));
+        let counts = [peaks.n.to_string(), peaks.invalid.to_string()];
+        head.into_iter().chain(percentiles).chain(counts).chain(measure_cells(run, &within, &[])).collect()
     };
+    let head = strings(["Suite", "Method", "Mean", "P5", "Median", "P95", "Valid", "Invalid"]);
+    let of_within = soft(runs).first().map(|run| measure_head(&run.summary.scores, &within, &[]));
     soft_table(
         runs,
-        "Peak FEM-RMS deformation, % of the settled bounding-box diagonal. The mean is over the valid episodes; percentiles are over all, with invalid ones ranked as worst (∞). On the right, deformation within an episode, averaged over the valid ones.",
-        strings([
-            "Suite",
-            "Method",
-            "Mean",
-            "P5",
-            "Median",
-            "P95",
-            "Valid",
-            "Invalid",
-            "Mean in episode",
-            "Final",
-            "P95 in episode",
-            "Over τ, s",
-        ]),
+        "Peak FEM-RMS deformation, % of the settled bounding-box diagonal. The mean is over the valid episodes; percentiles are over all, with invalid ones ranked as worst (∞). On the right, deformation within an episode, averaged over the valid ones; the time over τ in s.",
+        head.into_iter().chain(of_within.unwrap_or_default()).collect(),
         row,
     )
 }
 
 /// Contact success and the grip ratio; `None` without a run.
 pub fn grip_table(runs: &[RunSummary]) -> Option<ResultTable> {
-    let row = |run: &RunSummary| {
-        let s = &run.summary.scores;
-        let Distribution { p5, median, p95, n, .. } = s.grip_ratio;
-        let head = [run.summary.suite.clone(), run.method.clone()];
-        let contact_safety = soft_rate(run, s, &s.contact_safety_rate);
-        let rates = [rate(&s.contact_success_rate), contact_safety, rate(&s.gentle_rate)];
-        let ratios = [p5, median, p95].map(|ratio| decimal(ratio, 2));
-        head.into_iter().chain(rates).chain(ratios).chain([n.to_string()]).collect()
-    };
-    let rows: Vec<Vec<String>> = runs.iter().map(row).collect();
-    (!rows.is_empty()).then(|| ResultTable {
-        caption: "Grip, % of episodes. Contact success is Goal Success with contact of both pads throughout the carry; contact safety is contact success with Safety Success and no slip of more than the limit. The grip ratio is the largest force on a pad over the least that holds the object on its path, over the valid episodes in which it was carried; gentle is Goal Success with a ratio of at most 2, unless the settings state another.".to_owned(),
-        head: strings([
-            "Suite",
-            "Method",
-            "Contact success",
-            "Contact safety",
-            "Gentle",
-            "Ratio P5",
-            "Median",
-            "P95",
-            "Episodes",
-        ]),
-        rows,
-    })
+    group_table(
+        &runs.iter().collect::<Vec<_>>(),
+        "Grip, % of episodes. Contact success is Goal Success with contact of both pads throughout the carry; contact safety is contact success with Safety Success and no slip of more than the limit. The grip ratio is the largest force on a pad over the least that holds the object on its path, over the valid episodes in which it was carried; gentle is Goal Success with a ratio of at most 2, unless the settings state another.",
+        MeasureGroup::Grip,
+        &[P5, MEDIAN, P95],
+        |scores| scores.grip_ratio.n,
+    )
 }
 
 /// Metrics of the suites; `None` without any.
@@ -203,32 +236,15 @@ pub fn metric_table(runs: &[RunSummary]) -> Option<ResultTable> {
 
 /// Volume of the target beyond the strain limits of its material; `None` if no material states them.
 pub fn crushed_table(runs: &[RunSummary]) -> Option<ResultTable> {
-    let row = |run: &RunSummary| {
-        let scores = &run.summary.scores;
-        let figures = [&scores.collapsed_volume, &scores.damaged_volume]
-            .into_iter()
-            .flat_map(|volume| [volume.mean, volume.median, volume.p95].map(|x| decimal(x, 2)));
-        let head = [run.summary.suite.clone(), run.method.clone()];
-        head.into_iter().chain(figures).chain([scores.collapsed_volume.n.to_string()]).collect()
-    };
     let is_stated = |run: &RunSummary| {
         run.summary.scores.collapsed_volume.n > 0 || run.summary.scores.damaged_volume.n > 0
     };
-    let table = soft_table(
-        runs,
+    let table = group_table(
+        &soft(runs),
         "Volume of the object beyond the strain limits of its material over all valid episodes, %: the largest share beyond the collapse strain at one time, and the share that was ever beyond the damage strain.",
-        strings([
-            "Suite",
-            "Method",
-            "Collapsed, mean",
-            "Median",
-            "P95",
-            "Damaged, mean",
-            "Median",
-            "P95",
-            "Episodes",
-        ]),
-        row,
+        MeasureGroup::Volume,
+        &[MEAN, MEDIAN, P95],
+        |scores| scores.collapsed_volume.n,
     );
     table.filter(|_| runs.iter().any(is_stated))
 }
@@ -290,21 +306,22 @@ pub fn task_table(run: &RunSummary) -> ResultTable {
 
 /// Harm to other objects, and the stages at which episodes failed; `None` without a run.
 pub fn stage_table(runs: &[RunSummary]) -> Option<ResultTable> {
+    let harm: Vec<&Measure> = Measure::of(MeasureGroup::Harm).collect();
     let row = |run: &RunSummary| {
         let s = &run.summary.scores;
-        let optional = |of: &Option<Rate>| of.as_ref().map_or_else(|| "N/A".to_owned(), rate);
-        let head = [run.summary.suite.clone(), run.method.clone()];
-        let harm = [optional(&s.others_ok_rate), s.others_unknown.to_string(), rate(&s.wrong_contact_rate)];
+        let head = [run.summary.suite.clone(), run.method.clone(), s.others_unknown.to_string()];
+        let harm = measure_cells(run, &harm, &[]);
         let stages =
             TaskStage::ALL.map(|stage| s.failed_stages.get(&stage).copied().unwrap_or(0).to_string());
         head.into_iter().chain(harm).chain(stages).collect()
     };
     let rows: Vec<Vec<String>> = runs.iter().map(row).collect();
-    let stages = TaskStage::ALL.map(TaskStage::name);
-    let head = ["Suite", "Method", "Others within their τ", "Unknown", "Touched others"];
-    (!rows.is_empty()).then(|| ResultTable {
-        caption: "Harm to other objects, % of episodes, and the number of episodes without Goal Success by the stage at which they ended.".to_owned(),
-        head: head.into_iter().chain(stages).map(str::to_owned).collect(),
+    let head = strings(["Suite", "Method", "Others unknown"]);
+    let of_harm = measure_head(&runs.first()?.summary.scores, &harm, &[]);
+    let stages = TaskStage::ALL.map(|stage| stage.name().to_owned());
+    Some(ResultTable {
+        caption: "Harm to other objects, % of episodes, with the number of episodes in which harm to others within their τ is unknown; and the number of episodes without Goal Success by the stage at which they ended.".to_owned(),
+        head: head.into_iter().chain(of_harm).chain(stages).collect(),
         rows,
     })
 }

@@ -149,7 +149,7 @@ fn harm_and_stages_have_a_table() {
     let table = stage_table(&runs).expect("recorded");
     assert_eq!(
         table.rows[0][2..],
-        strings(["0.0 [0.0, 79.3]", "0", "0.0 [0.0, 79.3]", "0", "0", "0", "1", "0", "0"])
+        strings(["0", "0.0 [0.0, 79.3]", "0.0 [0.0, 79.3]", "0.0 [0.0, 79.3]", "0", "0", "0", "1", "0", "0"])
     );
     let deformation = deformation_table(&runs).expect("soft");
     assert_eq!(deformation.rows[0][8..], strings(["0.20", "–", "–", "0.25"]));

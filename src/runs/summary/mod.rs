@@ -4,93 +4,22 @@
 //! What was judged in no episode has no rate. Distributions of D are over all episodes with a soft target: means over
 //! the valid ones, percentiles with invalid ones ranked as worst.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 
 use serde::Serialize;
 
-use super::record::{EpisodeRecord, UnreachableCommand};
+pub use super::measures::{EpisodeDeformation, GroupScores};
+use super::{
+    measures::Episodes,
+    record::{EpisodeRecord, UnreachableCommand},
+};
 use softvt_common::{episode_id::EpisodeIndex, text::counted};
 use softvt_evaluation::{
-    category::EpisodeCategory,
-    stage::TaskStage,
-    statistics::{Distribution, Rate, mean, stratified_bootstrap},
-    verdict::Outcome,
+    category::EpisodeCategory, statistics::Rate, verdict::Outcome,
 };
 
 /// Number of intervals of the κ curve between 0 and 1.
 const KAPPA_STEPS: u32 = 20;
-
-/// Success rates and deformation of a group of episodes.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct GroupScores {
-    /// Number of episodes, valid or not.
-    pub episodes: usize,
-    /// Number of episodes that were invalid or could not be run.
-    pub invalid: usize,
-    /// Number of valid episodes whose safety could not be judged, for lack of a threshold or of evidence.
-    pub safety_unknown: usize,
-    /// Number of episodes with a soft target whose deformation was not judged, for lack of a limit or of evidence.
-    pub not_judged: usize,
-    /// TSR, the task success rate: Goal Success.
-    pub tsr: Rate,
-    /// DSR of SoftVTBench's later release: Goal Success with D_peak ≤ τ, whether dropped or not. Null where no target
-    /// deforms, its rate where none was judged.
-    pub dsr: Option<Rate>,
-    /// Rate of Goal Success over all episodes.
-    pub goal_success_rate: Rate,
-    /// Rate of NoDrop over all episodes.
-    pub no_drop_rate: Rate,
-    /// D_peak ≤ τ of each soft target; null where no target deforms. Its rate is null where none was judged.
-    pub deformation_ok_rate: Option<Rate>,
-    /// Rate of Safety Success over all episodes; null where all targets are soft and none was judged.
-    pub safety_success_rate: Rate,
-    /// Goal Success minus Safety Success, percentage points.
-    pub goal_safe_gap: Option<f64>,
-    /// NoSlip.
-    pub no_slip_rate: Rate,
-    /// Goal Success with contact of both pads throughout the carry.
-    pub contact_success_rate: Rate,
-    /// Contact success with Safety Success and NoSlip; null where that of Safety Success is.
-    pub contact_safety_rate: Rate,
-    /// Goal Success with a gentle grip.
-    pub gentle_rate: Rate,
-    /// Largest force on a pad over the least that holds the target, over the valid episodes in which it was carried.
-    pub grip_ratio: Distribution,
-    /// Goal Success by the looser predicate of SoftVTBench's released code.
-    pub goal_v1_rate: Rate,
-    /// Share of episodes in which another object was lifted first.
-    pub wrong_instance_rate: Rate,
-    /// Share of valid episodes in which no other soft body exceeded its own τ, of those in which that is known; null
-    /// where it is never known.
-    pub others_ok_rate: Option<Rate>,
-    /// Number of valid episodes in which harm to other soft bodies is unknown.
-    pub others_unknown: usize,
-    /// Share of episodes in which the robot touched a movable object other than the target.
-    pub wrong_contact_rate: Rate,
-    /// Number of episodes without Goal Success by the stage at which they ended.
-    pub failed_stages: BTreeMap<TaskStage, usize>,
-    /// Number of episodes by their category.
-    pub categories: BTreeMap<EpisodeCategory, usize>,
-    /// Number of episodes of the category "over the limit" in which the object was crushed.
-    pub crushed_over_limit: usize,
-    /// Peak D over τ of the target for which it is largest, of the valid episodes that have both.
-    pub d_over_tau: Distribution,
-    /// Smallest and largest τ that was applied to a target, %; null without any.
-    pub tau_range: Option<TauRange>,
-    /// Deformation within the episodes.
-    pub within_episodes: EpisodeDeformation,
-    /// Largest peak D of a target in all episodes with a soft one, %; invalid ones rank as worst.
-    pub deformation: Distribution,
-    /// Largest peak D of a target in the valid episodes that reached the goal, %.
-    pub deformation_goal: Distribution,
-    /// Metrics of the suite over the valid episodes that have them, by name.
-    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
-    pub metrics: BTreeMap<String, Distribution>,
-    /// Largest share of the volume of a target beyond its collapse strain, over all valid episodes, %.
-    pub collapsed_volume: Distribution,
-    /// Largest share of the volume of a target that was ever beyond its damage strain, over all valid episodes, %.
-    pub damaged_volume: Distribution,
-}
 
 /// Smallest and largest τ of some episodes, %.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
@@ -101,17 +30,13 @@ pub struct TauRange {
     pub max: f64,
 }
 
-/// D of the object within an episode, each the mean over the valid episodes that have it; null without any.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
-pub struct EpisodeDeformation {
-    /// Mean D, %.
-    pub d_mean: Option<f64>,
-    /// D at the end, %.
-    pub d_final: Option<f64>,
-    /// 95th percentile of D, %.
-    pub d_p95: Option<f64>,
-    /// Longest time for which a target was over its τ, s.
-    pub time_over_tau_s: Option<f64>,
+impl TauRange {
+    /// Those of the soft targets; `None` without any.
+    pub(crate) fn new<'a>(records: impl Iterator<Item = &'a EpisodeRecord>) -> Option<Self> {
+        let taus: Vec<f64> = records.flat_map(EpisodeRecord::soft_targets).filter_map(|target| target.tau).collect();
+        let [min, max] = [f64::min, f64::max].map(|of| taus.iter().copied().reduce(of));
+        min.zip(max).map(|(min, max)| Self { min, max })
+    }
 }
 
 /// One point of the curve of safety over κ.
@@ -281,118 +206,7 @@ impl GroupScores {
 
     /// Scores of `records`.
     pub fn from_records(records: &[&EpisodeRecord]) -> Self {
-        let valid: Vec<_> = records.iter().copied().filter(|r| r.outcome.is_valid()).collect();
-        let rate = |test: fn(&EpisodeRecord) -> bool| {
-            Rate::new(valid.iter().filter(|r| test(r)).count(), records.len())
-        };
-        let soft: Vec<_> = records.iter().copied().filter(|r| r.has_soft_target()).collect();
-        let is_judged = soft.is_empty() || soft.iter().any(|r| r.is_deformation_judged());
-        let judged_rate = |test: fn(&EpisodeRecord) -> bool| match is_judged {
-            true => rate(test),
-            false => Rate::not_judged(),
-        };
-        let goal = rate(|r| r.verdict.goal);
-        let safety_rate = |test: fn(&EpisodeRecord) -> bool| match soft.len() == records.len() {
-            true => judged_rate(test),
-            false => rate(test),
-        };
-        let safety = safety_rate(|r| r.verdict.safety);
-        let peaks = |reached: fn(&EpisodeRecord) -> bool| -> Vec<f64> {
-            valid.iter().filter(|r| reached(r)).filter_map(|r| r.d_peak()).collect()
-        };
-        let mean_of = |value: fn(&EpisodeRecord) -> Option<f64>| {
-            mean(&valid.iter().filter_map(|r| value(r)).collect::<Vec<f64>>())
-        };
-        let others: Vec<bool> = valid.iter().filter_map(|r| r.verdict.others_ok).collect();
-        let mut failed_stages = BTreeMap::new();
-        for stage in records.iter().filter_map(|r| r.verdict.failed_stage) {
-            *failed_stages.entry(stage).or_insert(0) += 1;
-        }
-        let mut categories = BTreeMap::new();
-        for record in records {
-            *categories.entry(record.category()).or_insert(0) += 1;
-        }
-        let is_crushed_over_limit = |r: &&EpisodeRecord| {
-            r.category() == EpisodeCategory::OverLimit && r.crushed_volume_pct().is_some()
-        };
-        let taus = || soft.iter().flat_map(|r| r.soft_targets()).filter_map(|target| target.tau);
-        let tau_range = taus().reduce(f64::min).zip(taus().reduce(f64::max));
-        let over_valid = |value: fn(&EpisodeRecord) -> Option<f64>| {
-            Distribution::from_values(valid.iter().filter_map(|r| value(r)).collect())
-        };
-        let names: BTreeSet<&String> = valid.iter().flat_map(|r| r.stats.metrics.keys()).collect();
-        Self {
-            episodes: records.len(),
-            invalid: records.len() - valid.len(),
-            safety_unknown: valid.iter().filter(|r| !r.verdict.safety_known).count(),
-            not_judged: soft.iter().filter(|r| !r.is_deformation_judged()).count(),
-            tsr: goal,
-            dsr: (!soft.is_empty()).then(|| judged_rate(EpisodeRecord::is_deformation_safe)),
-            goal_success_rate: goal,
-            no_drop_rate: rate(|r| r.verdict.no_drop),
-            deformation_ok_rate: (!soft.is_empty())
-                .then(|| judged_rate(|r| r.is_within_limits() == Some(true))),
-            safety_success_rate: safety,
-            goal_safe_gap: goal.rate.zip(safety.rate).map(|(goal, safety)| goal - safety),
-            no_slip_rate: rate(|r| r.verdict.no_slip),
-            contact_success_rate: rate(|r| r.verdict.contact_success),
-            contact_safety_rate: safety_rate(|r| r.verdict.contact_safety),
-            gentle_rate: rate(|r| r.verdict.gentle),
-            grip_ratio: over_valid(|r| r.verdict.object().grip_ratio),
-            goal_v1_rate: rate(|r| r.verdict.goal_v1),
-            wrong_instance_rate: rate(|r| r.verdict.wrong_instance),
-            others_ok_rate: (!others.is_empty()).then(|| Rate::from_test(&others, |ok| *ok)),
-            others_unknown: valid.len() - others.len(),
-            wrong_contact_rate: Rate::from_test(records, |r| r.verdict.first_wrong_contact.is_some()),
-            failed_stages,
-            categories,
-            crushed_over_limit: records.iter().copied().filter(is_crushed_over_limit).count(),
-            d_over_tau: over_valid(EpisodeRecord::d_over_tau),
-            tau_range: tau_range.map(|(min, max)| TauRange { min, max }),
-            within_episodes: EpisodeDeformation {
-                d_mean: mean_of(|r| r.verdict.object().d_mean),
-                d_final: mean_of(|r| r.verdict.object().d_final),
-                d_p95: mean_of(|r| r.verdict.object().d_p95),
-                time_over_tau_s: mean_of(EpisodeRecord::time_over_tau_s),
-            },
-            deformation: Distribution::with_invalid(
-                peaks(|_| true),
-                soft.iter().filter(|r| !r.outcome.is_valid()).count(),
-            ),
-            deformation_goal: Distribution::from_values(peaks(|r| r.verdict.goal)),
-            metrics: names
-                .into_iter()
-                .map(|name| {
-                    let values =
-                        valid.iter().filter_map(|r| r.stats.metrics.get(name).copied().flatten()).collect();
-                    (name.clone(), Distribution::from_values(values))
-                })
-                .collect(),
-            collapsed_volume: over_valid(EpisodeRecord::collapsed_volume_pct),
-            damaged_volume: over_valid(EpisodeRecord::damaged_volume_pct),
-        }
-    }
-}
-
-impl GroupScores {
-    /// Adds the bootstrap intervals of the rates and of the mean D, stratified by task.
-    fn add_bootstrap(&mut self, tasks: &BTreeMap<usize, Vec<&EpisodeRecord>>) {
-        let outcomes = |test: fn(&EpisodeRecord) -> bool| -> Vec<Vec<bool>> {
-            let held = |r: &&EpisodeRecord| r.outcome.is_valid() && test(r);
-            tasks.values().map(|group| group.iter().map(held).collect()).collect()
-        };
-        self.goal_success_rate = self.goal_success_rate.with_bootstrap(&outcomes(|r| r.verdict.goal));
-        self.tsr = self.goal_success_rate;
-        self.no_drop_rate = self.no_drop_rate.with_bootstrap(&outcomes(|r| r.verdict.no_drop));
-        self.safety_success_rate = self.safety_success_rate.with_bootstrap(&outcomes(|r| r.verdict.safety));
-        self.dsr = self.dsr.map(|dsr| dsr.with_bootstrap(&outcomes(EpisodeRecord::is_deformation_safe)));
-        let within = |r: &EpisodeRecord| r.is_within_limits() == Some(true);
-        self.deformation_ok_rate =
-            self.deformation_ok_rate.map(|rate| rate.with_bootstrap(&outcomes(within)));
-        let peak = |r: &&EpisodeRecord| r.d_peak().filter(|_| r.outcome.is_valid());
-        let peaks: Vec<Vec<f64>> =
-            tasks.values().map(|group| group.iter().filter_map(peak).collect()).collect();
-        self.deformation.bootstrap95 = stratified_bootstrap(&peaks);
+        Self::new(&Episodes { records, tasks: None })
     }
 }
 
@@ -430,8 +244,7 @@ impl SuiteSummary {
         };
         let untouched = records.iter().filter(|r| r.verdict.goal_untouched);
         let by_task = grouped(&records, |r| r.header.id.task);
-        let mut scores = GroupScores::from_records(&records);
-        scores.add_bootstrap(&by_task);
+        let scores = GroupScores::new(&Episodes { records: &records, tasks: Some(&by_task) });
         Self {
             suite: suite.into(),
             policy: policy.into(),

@@ -1,6 +1,10 @@
 use super::*;
 use crate::record::tests::sample;
-use softvt_evaluation::verdict::{InvalidReason, Outcome, TargetVerdict, WrongObjectContact};
+use softvt_evaluation::{
+    stage::TaskStage,
+    statistics::Distribution,
+    verdict::{InvalidReason, TargetVerdict, WrongObjectContact},
+};
 
 fn episode(task: usize, index: u32, edit: impl Fn(&mut EpisodeRecord)) -> EpisodeRecord {
     let mut record = sample();
