@@ -16,7 +16,6 @@ pub mod measures;
 pub mod paired_stats;
 pub mod paired_tests;
 pub mod record;
-pub mod record_check;
 pub mod record_line;
 pub mod requirement;
 pub mod run_folder;

@@ -1,14 +1,14 @@
 //! Record of one episode: one line of `episodes.jsonl`.
 //!
 //! [`EpisodeRecord`] flattens four parts into one JSON object: the [`EpisodeHeader`] with its id, its [`Outcome`], the
-//! [`Verdict`] of the judge and the [`RolloutStats`]. [`super::record_check`] reads a record: what follows from other
-//! fields is checked there.
+//! [`Verdict`] of the judge and the [`RolloutStats`]. [`super::record_line`] writes and reads a line with its digest.
 
 use std::{collections::BTreeMap, fmt};
 
-use serde::{Deserialize, Serialize, Serializer, ser::SerializeMap};
+use serde::{Deserialize, Serialize, Serializer, de::DeserializeOwned, ser::SerializeMap};
+use serde_json::json;
 
-use softvt_common::episode_id::EpisodeId;
+use softvt_common::episode_id::{EpisodeId, EpisodeSplit};
 use softvt_common::text::decimal;
 use softvt_evaluation::{
     category::{CRUSHED_PCT, EpisodeCategory},
@@ -251,6 +251,39 @@ pub struct EpisodeRecord {
     pub stats: RolloutStats,
 }
 
+/// True for a key that a record has or may have, other than those within its fields.
+pub fn is_record_key(name: &str) -> bool {
+    /// True if a field of a `T` reads the key: none takes lists of empty lists.
+    fn is_read<T: Serialize + DeserializeOwned>(part: &T, name: &str) -> bool {
+        let mut part = json!(part);
+        part[name] = json!([[[]]]);
+        serde_json::from_value::<T>(part).is_err()
+    }
+    let id = EpisodeId {
+        suite: String::new(),
+        task: 0,
+        episode: 0,
+        base_seed: 0,
+        split: EpisodeSplit::default(),
+    };
+    let header = EpisodeHeader {
+        id,
+        prompt: String::new(),
+        task_prompt: None,
+        layout: String::new(),
+        policy: String::new(),
+        privileged: false,
+        replayed: false,
+        asset: String::new(),
+        soft: false,
+        variation: None,
+        origin: None,
+    };
+    let verdict = Verdict { targets: vec![TargetVerdict::default()], ..Verdict::default() };
+    let is_of_verdict = is_read(&verdict, name) && name != "object";
+    name == "outcome" || is_read(&header, name) || is_of_verdict || is_read(&RolloutStats::default(), name)
+}
+
 impl EpisodeRecord {
     /// The one word for the result of the episode.
     pub fn category(&self) -> EpisodeCategory {
@@ -490,6 +523,18 @@ pub(crate) mod tests {
         );
         let glyphs = EpisodeCategory::ALL.map(EpisodeCategory::glyph);
         assert!(glyphs.iter().enumerate().all(|(at, glyph)| !glyphs[..at].contains(glyph)));
+    }
+
+    #[test]
+    fn every_key_of_a_record_and_no_other_is_one() {
+        let written = serde_json::to_value(sample()).unwrap();
+        let absent = ["task_prompt", "targets", "goal_parts", "others", "gave_up", "variation", "clamped_steps"];
+        for key in written.as_object().unwrap().keys().map(String::as_str).chain(absent) {
+            assert!(is_record_key(key), "{key}");
+        }
+        for other in ["object", "reason", "slip", "d_over_tau", "weight"] {
+            assert!(!is_record_key(other), "{other}");
+        }
     }
 
     #[test]

@@ -5,7 +5,7 @@
 
 use std::path::Path;
 
-use super::{record::EpisodeRecord, record_check::RecordError};
+use super::record::EpisodeRecord;
 use softvt_common::{
     digest::sha256_hex,
     files::{FileError, json_lines},
@@ -15,8 +15,8 @@ use softvt_common::{
 #[derive(Debug, thiserror::Error)]
 #[allow(missing_docs, reason = "the messages describe the variants")]
 pub enum LineError {
-    #[error(transparent)]
-    Record(#[from] RecordError),
+    #[error("not an episode record: {0}")]
+    Record(#[from] serde_json::Error),
     #[error("it has no record_sha256")]
     NoDigest,
     #[error(
@@ -54,12 +54,12 @@ pub fn write_line(path: &Path, record: &EpisodeRecord) -> Result<String, FileErr
 pub fn read_line(line: &[u8]) -> Result<EpisodeRecord, LineError> {
     let (record, end) = line.split_at(line.len().saturating_sub(ending(b"").len()));
     if end == ending(record).as_bytes() {
-        return Ok(EpisodeRecord::from_json(&[record, b"}"].concat())?);
+        return Ok(serde_json::from_slice(&[record, b"}"].concat())?);
     }
     if end.starts_with(KEY.as_bytes()) {
         return Err(LineError::OtherDigest);
     }
-    EpisodeRecord::from_json(line)?;
+    serde_json::from_slice::<EpisodeRecord>(line)?;
     Err(LineError::NoDigest)
 }
 

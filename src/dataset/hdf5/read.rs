@@ -159,7 +159,7 @@ impl TaskFile {
             Ok(environment) if environment["env_name"] == "softvt" => error,
             _ => DatasetError::not_recorded_by_softvt(&self.path, format!("/data/demo_{demo}")),
         })?;
-        EpisodeRecord::from_json(text.as_bytes())
+        serde_json::from_str(&text)
             .map_err(|error| DatasetError::content(&self.path, key, error.to_string()))
     }
 

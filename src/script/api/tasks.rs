@@ -17,7 +17,7 @@ use softvt_benchmark::{
     metric::{Metric, Reduction},
     variation::{FactorRange, HiddenRanges, VariationRanges},
 };
-use softvt_runs::record_check::is_record_key;
+use softvt_runs::record::is_record_key;
 
 /// Type of a layout's function.
 const BUILD: Type = Type::Function("fun(scene: softvt.Scene, rng: softvt.Rng)");
