@@ -1,10 +1,9 @@
 //! The episodes of a run in order. They are counted and not stored, since `--episodes` can request billions.
 
-use std::ops::Range;
+use std::collections::BTreeSet;
 
 use softvt_benchmark::Task;
 use softvt_common::episode_id::EpisodeIndex;
-
 use softvt_runs::shard::Shard;
 
 /// An episode to run.
@@ -23,64 +22,60 @@ impl EpisodeJob<'_> {
     }
 }
 
-/// Episodes in the order in which they run. A position in the list counts from 0.
+/// Episodes in the order in which they run: task by task, ascending. A position in the list counts from 0.
 #[derive(Clone, Debug)]
 pub struct EpisodeList<'a> {
-    all: Episodes<'a>,
-    /// Positions that are left out, ascending.
-    omitted: Vec<usize>,
+    tasks: Vec<&'a Task>,
+    episodes: Episodes,
+    /// Only this part of the episodes.
+    shard: Option<Shard>,
+    /// Episodes that are left out.
+    omitted: BTreeSet<EpisodeIndex>,
 }
 
 #[derive(Clone, Debug)]
-enum Episodes<'a> {
-    /// Episodes `0..episodes` of each task, or those of a shard.
-    Range {
-        tasks: Vec<&'a Task>,
-        episodes: u32,
-        shard: Option<Shard>,
-    },
-    Listed(Vec<EpisodeJob<'a>>),
+enum Episodes {
+    /// The first ones of each task.
+    First(u32),
+    Listed(BTreeSet<EpisodeIndex>),
 }
 
 impl<'a> EpisodeList<'a> {
-    /// Episodes `0..episodes` of each task, task by task; with `shard` only those of this part.
+    /// Episodes `0..episodes` of each task; with `shard` only those of this part.
     pub fn of_tasks(tasks: &[&'a Task], episodes: u32, shard: Option<Shard>) -> Self {
-        Self { all: Episodes::Range { tasks: tasks.to_vec(), episodes, shard }, omitted: Vec::new() }
+        let (tasks, episodes) = (tasks.to_vec(), Episodes::First(episodes));
+        Self { tasks, episodes, shard, omitted: BTreeSet::new() }
     }
 
     /// These episodes.
-    pub fn listed(jobs: Vec<EpisodeJob<'a>>) -> Self {
-        Self { all: Episodes::Listed(jobs), omitted: Vec::new() }
+    pub fn listed(jobs: impl IntoIterator<Item = EpisodeJob<'a>>) -> Self {
+        let jobs: Vec<EpisodeJob> = jobs.into_iter().collect();
+        let mut tasks: Vec<&Task> = jobs.iter().map(|job| job.task).collect();
+        tasks.sort_by_key(|task| task.id);
+        tasks.dedup_by_key(|task| task.id);
+        let episodes = Episodes::Listed(jobs.iter().map(EpisodeJob::index).collect());
+        Self { tasks, episodes, shard: None, omitted: BTreeSet::new() }
     }
 
     /// The tasks of the episodes, those without one in a shard included, in order.
     pub fn tasks(&self) -> Vec<&'a Task> {
-        match &self.all {
-            Episodes::Range { tasks, .. } => tasks.clone(),
-            Episodes::Listed(jobs) => {
-                let mut tasks: Vec<&Task> = Vec::new();
-                for job in jobs {
-                    if tasks.iter().all(|task| task.id != job.task.id) {
-                        tasks.push(job.task);
-                    }
-                }
-                tasks
-            }
-        }
+        self.tasks.clone()
     }
 
     /// The list without these episodes.
     pub fn without(&self, done: impl Iterator<Item = EpisodeIndex>) -> Self {
-        let mut omitted: Vec<usize> = done.filter_map(|index| self.all.position(index)).collect();
-        omitted.extend(&self.omitted);
-        omitted.sort_unstable();
-        omitted.dedup();
-        Self { all: self.all.clone(), omitted }
+        let mut left = self.clone();
+        left.omitted.extend(done.filter(|index| self.find(*index).is_some()));
+        left
     }
 
     /// Number of episodes.
     pub fn len(&self) -> usize {
-        self.all.len() - self.omitted.len()
+        let all = match &self.episodes {
+            Episodes::First(count) => self.tasks.len() * *count as usize,
+            Episodes::Listed(listed) => listed.len(),
+        };
+        self.shard.map_or(all, |shard| shard.len(all)) - self.omitted.len()
     }
 
     /// True if no episode is left.
@@ -88,85 +83,57 @@ impl<'a> EpisodeList<'a> {
         self.len() == 0
     }
 
-    /// The episode at a position below [`EpisodeList::len`].
+    /// The episode at a position.
+    ///
+    /// # Panics
+    /// The position is not below [`EpisodeList::len`].
     pub fn job(&self, position: usize) -> EpisodeJob<'a> {
-        // The k-th omitted position has k before it, so the number of remaining ones before it does not decrease with
-        // k.
-        let mut before = (0, self.omitted.len());
-        while before.0 < before.1 {
-            let middle = before.0.midpoint(before.1);
-            match self.omitted[middle] - middle <= position {
-                true => before.0 = middle + 1,
-                false => before.1 = middle,
-            }
-        }
-        self.all.job(position + before.0)
+        self.iter().nth(position).expect("a position in the list")
     }
 
     /// The episodes in order.
     pub fn iter(&self) -> impl Iterator<Item = EpisodeJob<'a>> + '_ {
-        (0..self.len()).map(|position| self.job(position))
+        (0..self.tasks.len()).flat_map(|rank| self.of_rank(rank))
     }
 
     /// The episode with this index, if the list has it.
     pub fn find(&self, index: EpisodeIndex) -> Option<EpisodeJob<'a>> {
-        let position = self.all.position(index)?;
-        self.omitted.binary_search(&position).is_err().then(|| self.all.job(position))
+        let rank = self.tasks.iter().position(|task| task.id == index.task)?;
+        let is_known = match &self.episodes {
+            Episodes::First(count) => index.episode < *count,
+            Episodes::Listed(listed) => listed.contains(&index),
+        };
+        let job = EpisodeJob { task: self.tasks[rank], episode: index.episode };
+        (is_known && self.has(rank, index)).then_some(job)
     }
 
     /// Numbers of the episodes of a task, ascending.
     pub fn episodes_of(&self, task: usize) -> impl Iterator<Item = u32> + '_ {
-        let positions =
-            self.all.positions_of(task).filter(|position| self.omitted.binary_search(position).is_err());
-        let jobs = positions.map(|position| self.all.job(position));
-        jobs.filter(move |job| job.task.id == task).map(|job| job.episode)
-    }
-}
-
-impl<'a> Episodes<'a> {
-    fn len(&self) -> usize {
-        match self {
-            Self::Range { tasks, episodes, shard } => {
-                let all = tasks.len() * *episodes as usize;
-                shard.map_or(all, |shard| shard.len(all))
-            }
-            Self::Listed(jobs) => jobs.len(),
-        }
+        let rank = self.tasks.iter().position(|known| known.id == task);
+        rank.into_iter().flat_map(|rank| self.of_rank(rank)).map(|job| job.episode)
     }
 
-    fn job(&self, position: usize) -> EpisodeJob<'a> {
-        match self {
-            Self::Range { tasks, episodes, shard } => {
-                let number = shard.map_or(position, |shard| shard.number(position));
-                let episodes = *episodes as usize;
-                EpisodeJob { task: tasks[number / episodes], episode: (number % episodes) as u32 }
-            }
-            Self::Listed(jobs) => jobs[position],
-        }
+    /// The episodes of the task with this place among the tasks.
+    fn of_rank(&self, rank: usize) -> impl Iterator<Item = EpisodeJob<'a>> + '_ {
+        let task = self.tasks[rank];
+        let at = |episode: u32| EpisodeIndex { task: task.id, episode };
+        let (first, listed) = match &self.episodes {
+            Episodes::First(count) => (*count, None),
+            Episodes::Listed(listed) => (0, Some(listed.range(at(0)..=at(u32::MAX)))),
+        };
+        let listed = listed.into_iter().flatten().map(|index| index.episode);
+        let all = (0..first).chain(listed).map(at);
+        all.filter(move |index| self.has(rank, *index))
+            .map(move |index| EpisodeJob { task, episode: index.episode })
     }
 
-    /// Positions that include all of a task.
-    fn positions_of(&self, task: usize) -> Range<usize> {
-        match self {
-            Self::Range { tasks, episodes, shard } => {
-                let Some(rank) = tasks.iter().position(|known| known.id == task) else { return 0..0 };
-                let [first, end] = [rank, rank + 1].map(|rank| rank * *episodes as usize);
-                shard.map_or(first..end, |shard| shard.len(first)..shard.len(end))
-            }
-            Self::Listed(jobs) => 0..jobs.len(),
-        }
-    }
-
-    fn position(&self, index: EpisodeIndex) -> Option<usize> {
-        match self {
-            Self::Range { tasks, episodes, shard } => {
-                let task = tasks.iter().position(|task| task.id == index.task)?;
-                let number = task * *episodes as usize + index.episode as usize;
-                let is_listed = index.episode < *episodes && shard.is_none_or(|shard| shard.contains(number));
-                is_listed.then(|| shard.map_or(number, |shard| shard.position(number)))
-            }
-            Self::Listed(jobs) => jobs.iter().position(|job| job.index() == index),
-        }
+    /// True if an episode is of the shard and not left out.
+    fn has(&self, rank: usize, index: EpisodeIndex) -> bool {
+        let is_in = |shard: Shard| match self.episodes {
+            Episodes::First(count) => shard.contains(rank * count as usize + index.episode as usize),
+            Episodes::Listed(_) => true,
+        };
+        self.shard.is_none_or(is_in) && !self.omitted.contains(&index)
     }
 }
 
@@ -209,18 +176,10 @@ mod tests {
             parts.iter().map(pairs).collect::<Vec<_>>(),
             [vec![(0, 0), (1, 1)], vec![(0, 1), (1, 2)], vec![(0, 2)], vec![(1, 0)]]
         );
+        let index = |(task, episode): (usize, u32)| EpisodeIndex { task, episode };
         for part in &parts {
-            assert!(
-                part.iter().all(|job| part.find(job.index()).is_some_and(|own| own.index() == job.index()))
-            );
-            assert_eq!(
-                all.iter()
-                    .filter(|(task, episode)| part
-                        .find(EpisodeIndex { task: *task, episode: *episode })
-                        .is_some())
-                    .count(),
-                part.len()
-            );
+            let found: Vec<_> = all.into_iter().filter(|at| part.find(index(*at)).is_some()).collect();
+            assert_eq!((found.len(), found), (part.len(), pairs(part)));
         }
         assert_eq!(list.episodes_of(1).collect::<Vec<_>>(), [0, 1, 2]);
         assert_eq!(parts[1].episodes_of(1).collect::<Vec<_>>(), [2]);
@@ -247,10 +206,10 @@ mod tests {
         let tasks: Vec<&Task> = tasks.iter().collect();
         let list = EpisodeList::of_tasks(&tasks, u32::MAX, None);
         assert_eq!(list.len(), 10 * u32::MAX as usize);
+        assert_eq!((list.job(7).episode, list.episodes_of(9).next()), (7, Some(0)));
         let last = EpisodeIndex { task: 9, episode: u32::MAX - 1 };
-        assert_eq!(list.job(list.len() - 1).index(), last);
-        assert_eq!(list.episodes_of(9).next(), Some(0));
         let shorter = list.without(std::iter::once(last));
-        assert_eq!(shorter.job(shorter.len() - 1).episode, u32::MAX - 2);
+        assert!(list.find(last).is_some() && shorter.find(last).is_none());
+        assert_eq!(shorter.len(), list.len() - 1);
     }
 }

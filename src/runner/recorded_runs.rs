@@ -16,9 +16,6 @@ use softvt_runs::{
     stored_run::{self, StoredRun},
 };
 
-/// Missing episodes that a message lists.
-const MAX_LISTED: usize = 3;
-
 /// The runs in a folder, at most one of each suite.
 #[derive(Debug)]
 pub(crate) struct RecordedRuns {
@@ -70,18 +67,12 @@ impl RecordedRuns {
             return refuse(format!("its split is {other}, that of this run {own}"));
         }
         let missing = requested.without(episodes_with_actions(run));
-        if !missing.is_empty() {
-            let listed: Vec<String> =
-                missing.iter().take(MAX_LISTED).map(|job| job.index().to_string()).collect();
-            let listed = listed.join(", ");
-            let more = match missing.len().saturating_sub(MAX_LISTED) {
-                0 => String::new(),
-                more => format!(" and {more} more"),
-            };
+        if let Some(first) = missing.iter().next() {
             return refuse(format!(
-                "it lacks {} of the {} requested episodes: {listed}{more}; select available tasks and episodes",
+                "it lacks {} of the {} requested episodes (first: {}); select available tasks and episodes",
                 missing.len(),
-                requested.len()
+                requested.len(),
+                first.index()
             ));
         }
         for record in run.records.iter().filter(|record| requested.find(record.header.id.index()).is_some()) {

@@ -241,7 +241,7 @@ impl<'a> SuiteRecording<'a> {
     fn run_attempt(&self, job: EpisodeJob) -> Result<FinishedEpisode, RunError> {
         let run = &self.run;
         let origin = run.origins.get(&job.index());
-        let error = match (run.run_episode_from(job, origin, true, &run.controllers)?, origin) {
+        let error = match (run.simulate(job, origin, true, &run.controllers, &mut |_| Ok(()))?, origin) {
             (Ok(finished), _) => return Ok(finished),
             (Err(error), Some(origin))
                 if is_start_error(&error) && origin.start != InitialStateOverride::default() =>
@@ -257,7 +257,7 @@ impl<'a> SuiteRecording<'a> {
         });
         let layout_start = origin
             .map(|origin| DemonstrationOrigin { start: InitialStateOverride::default(), ..origin.clone() });
-        run.run_episode_from(job, layout_start.as_ref(), true, &failing)?
+        run.simulate(job, layout_start.as_ref(), true, &failing, &mut |_| Ok(()))?
             .map_err(|error| run.episode_error(&error))
     }
 

@@ -55,16 +55,12 @@ pub fn select_tasks<'a>(config: &RunConfig, suite: &'a Suite) -> Result<Vec<&'a 
         let before = selected.len();
         selected.extend(suite.tasks.iter().filter(matches));
         if selected.len() == before {
-            let available = match suite.tasks.len() {
-                1 => "it has only task 0".to_owned(),
-                count => format!("it has tasks 0 to {}", count.saturating_sub(1)),
-            };
-            let (name, prompt) = (&suite.name, &suite.tasks[0].prompt);
-            let part = match index {
-                Some(_) => String::new(),
-                None => format!("; a word selects those with it in their prompt, such as {prompt:?}"),
-            };
-            let message = format!("suite {name} has no such task; {available}{part}");
+            let message = format!(
+                "suite {} has no such task; give an index from 0 to {}, or a part of a prompt such as {:?}",
+                suite.name,
+                suite.tasks.len().saturating_sub(1),
+                suite.tasks[0].prompt
+            );
             return Err(config.error_of("tasks", word, message));
         }
     }
@@ -165,13 +161,9 @@ fn check_filter(
     let Some(beyond) = selected.iter().find(|episode| !config.runs_episode(suite, **episode)) else {
         return Ok(());
     };
-    let available = match (&config.selected_episodes[..], config.episodes_of(suite)) {
-        ([], 1) => "only episode 0".to_owned(),
-        ([], count) => format!("episodes 0 to {}", count.saturating_sub(1)),
-        (selected, _) => {
-            let list: Vec<String> = selected.iter().map(u32::to_string).collect();
-            format!("only episode{} {}", if list.len() == 1 { "" } else { "s" }, list.join(", "))
-        }
+    let available = match &config.selected_episodes[..] {
+        [] => format!("the first {} episodes", config.episodes_of(suite)),
+        selected => format!("only the episodes {selected:?}"),
     };
     let message =
         format!("suite {} runs {available} of each task; select one of them, or run others", suite.name);

@@ -328,27 +328,16 @@ impl<'a> SuiteRun<'a> {
         controllers: &ControllerFactory,
     ) -> Result<FinishedEpisode, RunError> {
         let origin = self.origins.get(&job.index());
-        self.run_episode_from(job, origin, keep_states, controllers)?.map_err(|e| self.episode_error(&e))
+        let run = self.simulate(job, origin, keep_states, controllers, &mut |_| Ok(()))?;
+        run.map_err(|error| self.episode_error(&error))
     }
 
-    /// Runs one episode from the start of a foreign demonstration, or from that of the layout.
+    /// Runs one episode from the start of a foreign demonstration, or from that of the layout, and calls `watch` as
+    /// [`Episode::run_watched`] does.
     ///
     /// # Errors
-    /// The script or the controller does not start. The inner result: the scene is not valid, or the episode fails.
-    pub fn run_episode_from(
-        &self,
-        job: EpisodeJob<'_>,
-        origin: Option<&DemonstrationOrigin>,
-        keep_states: bool,
-        controllers: &ControllerFactory,
-    ) -> Result<Result<FinishedEpisode, EpisodeError>, RunError> {
-        self.simulate(job, origin, keep_states, controllers, &mut |_| Ok(()))
-    }
-
-    /// As [`Self::run_episode_from`], and calls `watch` as [`Episode::run_watched`] does.
-    ///
-    /// # Errors
-    /// As [`Self::run_episode_from`], and those of `watch`.
+    /// The script or the controller does not start. The inner result: the scene is not valid, or the episode or `watch`
+    /// fails.
     pub(crate) fn simulate(
         &self,
         job: EpisodeJob<'_>,

@@ -27,16 +27,6 @@ impl Shard {
     pub fn len(&self, all: usize) -> usize {
         (all + self.count - self.index) / self.count
     }
-
-    /// Number in the whole run of the episode at a position in the shard, both from 0.
-    pub fn number(&self, position: usize) -> usize {
-        position * self.count + self.index - 1
-    }
-
-    /// Position in the shard of one of its episodes by its number in the whole run.
-    pub fn position(&self, number: usize) -> usize {
-        number / self.count
-    }
 }
 
 impl FromStr for Shard {

@@ -1,7 +1,7 @@
 //! Merges the shards of a run into the folder that a single run would have written.
 
 use std::{
-    collections::{BTreeMap, BTreeSet},
+    collections::BTreeMap,
     fs, io,
     path::{Path, PathBuf},
 };
@@ -127,17 +127,12 @@ impl<'a> MergedRun<'a> {
                 actions::read_checked(&run.dir, record)?;
             }
         }
-        let (tasks, episodes): (BTreeSet<usize>, u32) =
-            (of_run.tasks.iter().copied().collect(), of_run.episodes);
-        let expected = tasks.len() * episodes as usize;
-        let of_task = |task: usize| (0..episodes).map(move |episode| EpisodeIndex { task, episode });
-        let first_missing =
-            tasks.iter().flat_map(|task| of_task(*task)).find(|index| !seen.contains_key(index));
-        if let Some(first) = first_missing {
-            let is_expected = |index: &&EpisodeIndex| tasks.contains(&index.task) && index.episode < episodes;
-            let missing = expected - seen.keys().filter(is_expected).count();
-            let suite = of_run.suite.clone();
-            return Err(MergeError::Missing { suite, missing, expected, first });
+        let RunManifest { tasks, episodes, suite, .. } = of_run;
+        let of_task = |task: usize| (0..*episodes).map(move |episode| EpisodeIndex { task, episode });
+        let mut all = tasks.iter().flat_map(|task| of_task(*task));
+        if let Some(first) = all.find(|index| !seen.contains_key(index)) {
+            let (suite, expected) = (suite.clone(), tasks.len() * *episodes as usize);
+            return Err(MergeError::Missing { suite, missing: expected - seen.len(), expected, first });
         }
         let mut records: Vec<EpisodeRecord> = shards.iter().flat_map(|run| run.records.clone()).collect();
         records.sort_by_key(|r| r.header.id.index());
@@ -165,9 +160,8 @@ impl<'a> MergedRun<'a> {
         }
         let path = shards[0].dir.join(softvtbench_files::FOLDER).join(softvtbench_files::THRESHOLDS_JSON);
         softvtbench_files::write_scores(folder, records, &ThresholdFile::read_released(&path)?)?;
-        // The records of a rigid twin carry its own suite name.
-        let suite = records.first().map_or(shards[0].suite(), |record| &record.header.id.suite);
-        let summary = SuiteSummary::from_records(suite, &manifest.policy, records);
+        let suite = manifest.changes().suite_name(&manifest.suite);
+        let summary = SuiteSummary::from_records(&suite, &manifest.policy, records);
         files::write_json(&folder.join(SUMMARY), &summary)?;
         Ok(summary)
     }

@@ -519,16 +519,16 @@ fn profiles_determine_the_inputs() {
         let names = names.lock().unwrap().clone();
         (names, summary, project.json("run/run.json"))
     };
-    let (vision, summary, _) = entries("vision", None);
+    let (vision, summary, info) = entries("vision", None);
     assert!(vision.iter().any(|k| k == "image") && vision.iter().any(|k| k == "observation/wrist_image"));
     assert!(!vision.iter().any(|k| k.contains("tactile")));
-    assert!(!summary.force_observed);
+    assert!(!summary.force_observed && info["force_observed"] == false);
     let (touch, _, info) = entries("visuo_tactile", Some(GripCode::Binary));
     assert!(touch.iter().any(|k| k == "observation/tactile_marker_motion"));
     assert_eq!(info["profile"]["actions"]["gripper"]["code"], "binary", "modality and gripper cross");
-    let (released, summary, _) = entries("softvtbench", None);
+    let (released, summary, info) = entries("softvtbench", None);
     assert!(released.iter().any(|k| k == "tactile_gripper_force"));
-    assert!(summary.force_observed);
+    assert!(summary.force_observed && info["force_observed"] == true);
 }
 
 #[test]
