@@ -76,32 +76,16 @@ pub fn run<E: From<RunError>>(
         return Err(config.error("the script returned no experiment").into());
     };
     let (points, out) = (*points, config.out.as_deref());
-    if let Some(dir) = out.filter(|_| !config.resume) {
-        RunFolder::check_new(dir).map_err(|error| config.error(error))?;
-    }
     let input = Arc::new(input(config)?);
     if *has_finish && out.is_none() {
         refuse_changed_project_files(config, loaded)?;
     }
     // Each point runs the script anew: what a point changes of its variables does not reach others.
     let open = || Experiment::open_with(loaded, &input).map_err(RunError::from);
-    let (mut folder, mut finished) = match out {
-        Some(dir) => {
-            let manifest = manifest(config, loaded, name, points);
-            let (folder, finished) = match config.resume {
-                true => ExperimentFolder::resume(dir, &manifest),
-                false => ExperimentFolder::create(dir, &manifest).map(|folder| (folder, BTreeMap::new())),
-            }
-            .map_err(RunError::from)?;
-            (Some(folder), finished)
-        }
-        None => (None, BTreeMap::new()),
-    };
-    if let Some(beyond) = finished.keys().find(|point| **point >= points) {
-        let message =
-            format!("its folder has point {beyond}, and there are {points}; give another output folder");
-        return Err(config.error(message).into());
-    }
+    let manifest = manifest(config, loaded, name, points);
+    let opened = out.map(|dir| ExperimentFolder::open(dir, &manifest, config.resume)).transpose();
+    let (mut folder, finished) = opened.map_err(RunError::from)?.unzip();
+    let mut finished = finished.unwrap_or_default();
     let left: Vec<usize> = (0..points).filter(|point| !finished.contains_key(point)).collect();
     let run_point = |job: usize| {
         let (experiment, point) = (open()?, left[job]);
@@ -137,23 +121,16 @@ pub fn run<E: From<RunError>>(
         };
         return Err(RunError { resumable: Some(dir.into()), ..RunError::interrupted(done) }.into());
     }
-    if outcome.is_err() && finished.is_empty() {
+    // Points of an earlier process may have used what these did not.
+    let refused = match left.len() == points {
+        true => refusal(config, &input, &rows, columns),
+        false => None,
+    };
+    if (outcome.is_err() && finished.is_empty()) || (outcome.is_ok() && refused.is_some()) {
         folder.take().map_or(Ok(()), ExperimentFolder::discard).map_err(RunError::from)?;
     }
     outcome?;
-    // Points of an earlier process may have used what these did not.
-    if left.len() == points
-        && let Err(error) = input.check_used()
-    {
-        folder.take().map_or(Ok(()), ExperimentFolder::discard).map_err(RunError::from)?;
-        return Err(input_error(config, &error).into());
-    }
-    if left.len() == points
-        && let Some(problem) = problem_of(&rows, columns)
-    {
-        folder.take().map_or(Ok(()), ExperimentFolder::discard).map_err(RunError::from)?;
-        return Err(config.error(problem).into());
-    }
+    refused.map_or(Ok(()), Err)?;
     // The rows are kept if finish fails.
     on_output(ExperimentOutput::Rows(&rows))?;
     if let Some(folder) = &mut folder {
@@ -163,19 +140,19 @@ pub fn run<E: From<RunError>>(
     if let Some(text) = &finish.text {
         on_output(ExperimentOutput::Text(text))?;
     }
-    let base = out.map(Path::to_owned).unwrap_or_default();
-    // Also on systems where the case of names does not count.
-    let is_reserved = |path: &str| {
-        RESERVED
-            .iter()
-            .any(|name| path.split('/').next().is_some_and(|first| first.eq_ignore_ascii_case(name)))
-    };
-    if let Some((reserved, _)) = finish.files.iter().find(|(path, _)| out.is_some() && is_reserved(path)) {
-        let message = format!("finish.files: {reserved} is written by softvt; give another path");
-        return Err(config.error(message).into());
-    }
-    finish.files.iter().try_for_each(|(relative, bytes)| write(config, &base, relative, bytes))?;
+    finish.files.iter().try_for_each(|(path, bytes)| write(config, path, bytes))?;
     Ok(finish.problem.map_or(Ok(()), |problem| Err(config.error(problem)))?)
+}
+
+/// The error of an experiment that has run whole: settings or a seed that no point used, or rows that lack something.
+fn refusal(
+    config: &RunConfig,
+    input: &ExperimentInput,
+    rows: &[ExperimentRow],
+    columns: &[String],
+) -> Option<RunError> {
+    let unused = input.check_used().err().map(|error| input_error(config, &error));
+    unused.or_else(|| problem_of(rows, columns).map(|problem| config.error(problem)))
 }
 
 /// What the rows of all points lack.
@@ -251,8 +228,14 @@ fn refuse_changed_project_files(config: &RunConfig, loaded: &LoadedScript) -> Re
     }
 }
 
-/// Writes a file of the script under `base`. Refuses to follow symbolic links, which could lead out of the folder.
-fn write(config: &RunConfig, base: &Path, relative: &str, bytes: &[u8]) -> Result<(), RunError> {
+/// Writes a file of the script into the output folder, or below the working folder. Refuses to follow symbolic links,
+/// which could lead out of the folder, and names of files of softvt, also where the case of names does not count.
+fn write(config: &RunConfig, relative: &str, bytes: &[u8]) -> Result<(), RunError> {
+    let first = relative.split('/').next().unwrap_or_default();
+    if config.out.is_some() && RESERVED.iter().any(|name| first.eq_ignore_ascii_case(name)) {
+        return Err(config.error(format!("finish.files: {relative} is written by softvt; give another path")));
+    }
+    let base = config.out.clone().unwrap_or_default();
     let path = base.join(relative);
     let between = path.ancestors().skip(1).take_while(|folder| *folder != base);
     if let Some(link) = between.into_iter().find(|folder| folder.is_symlink()) {

@@ -51,29 +51,24 @@ pub struct ExperimentFolder {
 }
 
 impl ExperimentFolder {
-    /// Creates the folder.
+    /// Creates the folder, or with `resume` opens that of the same experiment, and returns its finished points by
+    /// number.
     ///
     /// # Errors
-    /// It holds something, or cannot be written to.
-    pub fn create(dir: &Path, manifest: &ExperimentManifest) -> Result<Self, RunFolderError> {
-        RunFolder::check_new(dir)?;
-        files::create_folder(dir)?;
-        let points = Journal::create(&dir.join(POINTS)).map_err(of_folder(dir, POINTS))?;
-        manifest.write_or_compare(dir)?;
-        Ok(Self { dir: dir.into(), points })
-    }
-
-    /// Opens the folder of the same experiment, and returns its finished points by number.
-    ///
-    /// # Errors
-    /// It holds another experiment or something else, another process uses it, or a line is not a point.
-    pub fn resume(
+    /// It holds another experiment or something else, another process uses it, a line is not a point, or the system
+    /// refuses.
+    pub fn open(
         dir: &Path,
         manifest: &ExperimentManifest,
+        resume: bool,
     ) -> Result<(Self, BTreeMap<usize, FinishedPoint>), RunFolderError> {
         let path = dir.join(POINTS);
-        if !path.exists() {
-            return Ok((Self::create(dir, manifest)?, BTreeMap::new()));
+        if !(resume && path.exists()) {
+            RunFolder::check_new(dir)?;
+            files::create_folder(dir)?;
+            let points = Journal::create(&path).map_err(of_folder(dir, POINTS))?;
+            manifest.write_or_compare(dir)?;
+            return Ok((Self { dir: dir.into(), points }, BTreeMap::new()));
         }
         let (mut points, bytes) = Journal::resume(&path).map_err(of_folder(dir, POINTS))?;
         manifest.write_or_compare(dir)?;
@@ -198,17 +193,17 @@ mod tests {
         .expect("a manifest");
         let dir = dir.path().join("e");
         let second = point(1, json!({ "gap": 1 }), json!([{ "d": 2 }]));
-        let mut folder = ExperimentFolder::create(&dir, &manifest).expect("created");
+        let (mut folder, _) = ExperimentFolder::open(&dir, &manifest, false).expect("created");
         folder.add(&second).expect("written");
-        assert!(ExperimentFolder::resume(&dir, &manifest).is_err(), "another process uses it");
+        assert!(ExperimentFolder::open(&dir, &manifest, true).is_err(), "another process uses it");
         drop(folder);
-        assert!(ExperimentFolder::create(&dir, &manifest).is_err());
-        let other = ExperimentFolder::resume(&dir, &ExperimentManifest { seed: 1, ..manifest.clone() });
+        assert!(ExperimentFolder::open(&dir, &manifest, false).is_err());
+        let other = ExperimentFolder::open(&dir, &ExperimentManifest { seed: 1, ..manifest.clone() }, true);
         assert!(other.err().expect("refused").to_string().contains("seed: 0 before, 1 now"));
         let path = dir.join(POINTS);
         let whole = std::fs::read(&path).expect("read");
         std::fs::write(&path, [&whole[..], b"{\"poi"].concat()).expect("written");
-        let (mut folder, finished) = ExperimentFolder::resume(&dir, &manifest).expect("resumed");
+        let (mut folder, finished) = ExperimentFolder::open(&dir, &manifest, true).expect("resumed");
         assert_eq!(finished, BTreeMap::from([(1, second.clone())]));
         let first = point(0, json!({ "gap": 0 }), json!([]));
         folder.add(&first).expect("written");
