@@ -56,9 +56,9 @@ pub fn select_tasks<'a>(config: &RunConfig, suite: &'a Suite) -> Result<Vec<&'a 
         selected.extend(suite.tasks.iter().filter(matches));
         if selected.len() == before {
             let message = format!(
-                "suite {} has no such task; give an index from 0 to {}, or a part of a prompt such as {:?}",
+                "suite {} has no such task; give an index below {}, or a part of a prompt such as {:?}",
                 suite.name,
-                suite.tasks.len().saturating_sub(1),
+                suite.tasks.len(),
                 suite.tasks[0].prompt
             );
             return Err(config.error_of("tasks", word, message));
@@ -162,7 +162,7 @@ fn check_filter(
         return Ok(());
     };
     let available = match &config.selected_episodes[..] {
-        [] => format!("the first {} episodes", config.episodes_of(suite)),
+        [] => format!("the episodes below {}", config.episodes_of(suite)),
         selected => format!("only the episodes {selected:?}"),
     };
     let message =

@@ -48,7 +48,7 @@ fn unknown_flags_get_a_suggestion() {
 
 #[test]
 fn unknown_tasks_shifts_and_settings_are_reported() {
-    assert_snapshot!(small("--task 7"), @"x.lua: --task 7: suite one has no such task; it has only task 0");
+    assert_snapshot!(small("--task 7"), @r#"x.lua: --task 7: suite one has no such task; give an index below 1, or a part of a prompt such as "wait""#);
     let words = ["x.lua", "--out", "run", "--task", ""];
     let project = Small::default().project();
     let mut command = project.command("");

@@ -170,7 +170,7 @@ fn the_mcap_file_of_a_view_is_that_of_a_run_and_of_its_replay() {
     }
     assert!(fs::read(project.path("seen/noop/episode.mcap")).expect("written") != of_run);
     let refused = project.refusal("x.lua --episodes 1 --mcap=3");
-    assert!(refused.contains("--mcap 3: suite one runs only episode 0 of each task"), "{refused}");
+    assert!(refused.contains("--mcap 3: suite one runs the episodes below 1 of each task"), "{refused}");
     project.succeeds("replay run 0/0 --mcap replayed/episode.mcap");
     let results = fs::read(project.path("run/episodes.jsonl")).expect("written");
     for path in ["run", "run/episodes.jsonl", "x.lua"] {
@@ -345,7 +345,10 @@ fn missing_tactile_tables_are_reported() {
 fn videos_of_episodes_that_are_not_run_are_refused() {
     let project = short();
     let message = project.refusal("x.lua --episodes 2 --video=1,7 --out run");
-    assert!(message.contains("x.lua: --video 7: suite one runs episodes 0 to 1 of each task"), "{message}");
+    assert!(
+        message.contains("x.lua: --video 7: suite one runs the episodes below 2 of each task"),
+        "{message}"
+    );
     assert!(!project.path("run").exists());
 }
 

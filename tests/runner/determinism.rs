@@ -54,7 +54,7 @@ fn selected_episodes_are_those_of_a_whole_run() {
     assert!(other.contains("belongs to another run: episodes: 2 before, 1 now"), "{other}");
     let video = |config: &mut RunConfig| config.video = Some(EpisodeFilter::Episodes(vec![0]));
     let video = selected(&[1]).out("other").with(video).error();
-    assert!(video.contains("runs only episode 1 of each task"), "{video}");
+    assert!(video.contains("runs only the episodes [1] of each task"), "{video}");
 }
 
 #[test]

@@ -200,7 +200,7 @@ fn recorded_actions_must_fit_the_run() {
     };
     refused(run(2).seed(1), "policy run: its seed is 0, that of this run 1");
     refused(run(2).twin(), "no run of suite one (rigid twin); available: one");
-    refused(run(4), "it lacks 2 of the 4 requested episodes: task 0 episode 2, task 0 episode 3");
+    refused(run(4), "it lacks 2 of the 4 requested episodes (first: task 0 episode 2)");
     let actions = project.path("run/actions/task_000/episode_00001.npy");
     let whole = std::fs::read(&actions).expect("actions");
     let mut changed = whole.clone();
@@ -209,7 +209,7 @@ fn recorded_actions_must_fit_the_run() {
     refused(run(2), "episode_00001.npy: its SHA-256 differs");
     std::fs::write(&actions, whole).expect("written");
     std::fs::remove_file(project.path("run/actions/task_000/episode_00001.npy")).expect("removed");
-    refused(run(2), "it lacks 1 of the 2 requested episodes: task 0 episode 1");
+    refused(run(2), "it lacks 1 of the 2 requested episodes (first: task 0 episode 1)");
     let other = project.text("x.lua").replace("name = \"one\", object", "name = \"two\", object");
     project.write("x.lua", other.as_bytes());
     refused(run(1), "no run of suite two; available: one");
