@@ -19,7 +19,7 @@ use softvt_dataset::{OptionalStream, card::KeptOutcome};
 use softvt_policy::{profile::GripCode, remote::ServerProtocol};
 use softvt_runner::{
     ConfiguredScript, EpisodeFilter, PolicyConfig, PolicyOptions, PolicySource, RunConfig, Shard,
-    TraceDetail, parse_profile, read_secret, recording::RecordingOptions, selection::select_tasks,
+    TraceDetail, parse_profile, read_secret, recording::RecordingOptions, suite_selection::select_tasks,
 };
 use softvt_runs::{
     requirement::Requirement,

@@ -119,36 +119,18 @@ pub(crate) fn print_recording(out: &Path, summary: Option<RecordingSummary>) -> 
 }
 
 /// The format of a file that a flag names as output.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum OutputFormat {
-    Svg,
-    Mcap,
-    Json,
+pub(crate) struct OutputFormat {
+    name: &'static str,
+    /// The ending that names must have, if any.
+    extension: Option<&'static str>,
+    /// What files of the format begin with, after white space.
+    begins: &'static [&'static [u8]],
 }
 
 impl OutputFormat {
-    fn name(self) -> &'static str {
-        match self {
-            Self::Svg => "SVG",
-            Self::Mcap => "MCAP",
-            Self::Json => "JSON",
-        }
-    }
-
-    /// The ending that names must have. Those of the other formats are free.
-    fn extension(self) -> Option<&'static str> {
-        (self == Self::Svg).then_some("svg")
-    }
-
-    /// True if a file of the format can begin with these bytes.
-    fn begins_with(self, bytes: &[u8]) -> bool {
-        let text = bytes.trim_ascii_start();
-        match self {
-            Self::Svg => text.starts_with(b"<svg") || text.starts_with(b"<?xml"),
-            Self::Mcap => bytes.starts_with(b"\x89MCAP0\r\n"),
-            Self::Json => text.starts_with(b"{"),
-        }
-    }
+    pub(crate) const SVG: Self = Self { name: "SVG", extension: Some("svg"), begins: &[b"<svg", b"<?xml"] };
+    pub(crate) const MCAP: Self = Self { name: "MCAP", extension: None, begins: &[b"\x89MCAP0\r\n"] };
+    pub(crate) const JSON: Self = Self { name: "JSON", extension: None, begins: &[b"{"] };
 }
 
 /// Checks before the work that the file of `flag` can be written and replaces nothing but a file of its format.
@@ -157,8 +139,8 @@ impl OutputFormat {
 /// Its name has another ending than those of the format, another file or a folder has the name, or its folder is
 /// read-only.
 pub(crate) fn check_output_file(flag: &str, path: &Path, format: OutputFormat) -> Result<(), CliError> {
-    let file = path.display();
-    if let Some(extension) = format.extension()
+    let (file, OutputFormat { name, extension, begins }) = (path.display(), format);
+    if let Some(extension) = extension
         && path.extension().is_none_or(|found| found != extension)
     {
         return Err(CliError::input(format!("{flag} {file}: give a file that ends in .{extension}")));
@@ -169,8 +151,8 @@ pub(crate) fn check_output_file(flag: &str, path: &Path, format: OutputFormat) -
         opened.map_err(FileError::io("read", path))?;
     }
     // Empty files, such as those of mktemp, hold nothing to lose.
-    if path.exists() && !(path.is_file() && (first.is_empty() || format.begins_with(&first))) {
-        let name = format.name();
+    let begins_so = || begins.iter().any(|begin| first.trim_ascii_start().starts_with(begin));
+    if path.exists() && !(path.is_file() && (first.is_empty() || begins_so())) {
         return Err(CliError::input(format!(
             "{flag} {file}: it exists and is no {name} file; give another name"
         )));

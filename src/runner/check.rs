@@ -11,8 +11,8 @@ use crate::{
     episode_list::{EpisodeJob, EpisodeList},
     error::RunError,
     friction::{friction_warnings, layout_friction_warnings},
-    selection::select_episodes,
     suite_run::SuiteRun,
+    suite_selection::select_episodes,
 };
 use softvt_benchmark::{ObjectType, ShiftValue, Suite, Task};
 use softvt_common::{

@@ -13,8 +13,8 @@ use crate::{
     error::RunError,
     evaluate::{is_finished, run_suite},
     policy::PolicyConfig,
-    selection::{check_episodes, path_component, select_episodes, select_tasks},
     suite_run::{PreparedRun, SuiteRun},
+    suite_selection::{check_episodes, path_component, select_episodes, select_tasks},
 };
 use softvt_benchmark::{Condition, ObjectType, Plan, REFERENCE, Suite, Task, settings::Settings};
 use softvt_common::{files::replace, text};

@@ -32,12 +32,12 @@ pub mod replay;
 mod run_manifest;
 mod runner;
 pub mod script_catalog;
-pub mod selection;
 mod served_runs;
 mod serving;
 pub mod stored_folder;
 mod stored_scripts;
 mod suite_run;
+pub mod suite_selection;
 mod thumbnails;
 
 pub use check::SuiteChecker;

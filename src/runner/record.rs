@@ -10,8 +10,8 @@ use crate::{
     error::RunError,
     policy::{ControllerFactory, PolicyConfig, PolicyOptions, expert_controller},
     recording::{HoldingLog, RecordingOptions, RecordingSummary, SuiteRecording, record_all},
-    selection::{select_suites, select_tasks},
     suite_run::SuiteRun,
+    suite_selection::{select_suites, select_tasks},
 };
 use softvt_benchmark::{Suite, Teacher};
 use softvt_common::{episode_id::EpisodeIndex, parallel};

@@ -20,8 +20,8 @@ use crate::{
     error::RunError,
     evaluate::{RunLog, SimulatedEpisode, with_kept},
     policy::ControllerFactory,
-    selection::path_component,
     suite_run::{PreparedRun, SuiteRun},
+    suite_selection::path_component,
 };
 use softvt_benchmark::{CONTROL_HZ, Suite, Task};
 use softvt_common::cancel;

@@ -13,9 +13,9 @@ use crate::{
     error::RunError,
     observer::Observer,
     policy::{ControllerFactory, PolicyConfig, PolicyOptions, PolicySource},
-    selection::{select_tasks, suites_of},
     stored_scripts::StoredScripts,
     suite_run::{PreparedRun, SuiteRun},
+    suite_selection::{select_tasks, suites_of},
 };
 use softvt_benchmark::{Suite, seed::SecretSeed};
 use softvt_common::cancel;

@@ -13,8 +13,8 @@ use crate::{
     evaluate::{SuiteResult, run_episodes, run_suite},
     observer::Observer,
     policy::PolicyConfig,
-    selection::{check_episodes, check_parent_folder, next_run_dir, run_dir, select_suites},
     suite_run::SuiteRun,
+    suite_selection::{check_episodes, check_parent_folder, next_run_dir, run_dir, select_suites},
 };
 use softvt_benchmark::{Plan, ShiftValue};
 use softvt_runs::{record::EpisodeRecord, shard::Shard};

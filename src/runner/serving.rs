@@ -7,9 +7,9 @@ use serde_json::json;
 use crate::{
     config::{ConfiguredScript, RunConfig},
     error::RunError,
-    selection::{check_distinct_out_dirs, check_parent_folder, no_suites, run_dir, suites_of},
     served_runs::ServedRuns,
     suite_run::{PreparedRun, SuiteRun},
+    suite_selection::{check_distinct_out_dirs, check_parent_folder, no_suites, run_dir, suites_of},
 };
 use softvt_benchmark::{Plan, Suite};
 use softvt_common::{

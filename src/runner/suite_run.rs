@@ -16,7 +16,7 @@ use crate::{
     limits::{CalibrationFiles, Calibrations, LimitScan, SceneLimits},
     policy::{ControllerFactory, DeclaredStreams, PolicyConfig},
     recorded_runs::RecordedRuns,
-    selection::{select_episodes, select_tasks},
+    suite_selection::{select_episodes, select_tasks},
 };
 use softvt_benchmark::{ObjectType, ShiftValue, Suite, Task, settings::Settings};
 use softvt_common::cancel;

@@ -27,7 +27,7 @@ use softvt_rollout::{Episode, FinishedEpisode, SensingError};
 use softvt_runner::{
     ConfiguredScript, ControllerFactory, EpisodeJob, EpisodeList, PolicyConfig, PreparedRun, RunConfig,
     RunError, ServedRuns, SuiteRun,
-    selection::{select_episodes, select_tasks, suites_of},
+    suite_selection::{select_episodes, select_tasks, suites_of},
 };
 
 /// How often saved files are looked for.

@@ -25,7 +25,7 @@ use softvt::{
         episode_selector::EpisodeSelector,
         experiment::{self, ExperimentOutput},
         replay::{self, SecretFile},
-        selection::check_distinct_out_dirs,
+        suite_selection::check_distinct_out_dirs,
     },
     runs::{
         record::EpisodeRecord,

@@ -35,7 +35,7 @@ pub(crate) struct BenchArgs {
 /// The suite cannot be run, or the file cannot be written.
 pub(super) fn run(args: &BenchArgs) -> Result<(), CliError> {
     for (flag, path, format) in
-        [("--growth", &args.growth, OutputFormat::Svg), ("--out", &args.out, OutputFormat::Json)]
+        [("--growth", &args.growth, OutputFormat::SVG), ("--out", &args.out, OutputFormat::JSON)]
     {
         path.as_ref().map_or(Ok(()), |path| check_output_file(flag, path, format))?;
     }

@@ -10,7 +10,8 @@ use crate::{
 use softvt_benchmark::{Plan, REFERENCE, Suite};
 use softvt_common::text::{self, counted};
 use softvt_runner::{
-    ConfiguredScript, RunConfig, SuiteChecker, conditions, experiment, selection::check_distinct_out_dirs,
+    ConfiguredScript, RunConfig, SuiteChecker, conditions, experiment,
+    suite_selection::check_distinct_out_dirs,
 };
 
 /// Check a script without running it

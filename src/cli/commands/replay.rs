@@ -61,7 +61,7 @@ pub(super) fn run(args: &ReplayArgs) -> Result<(), CliError> {
         return report_replays(&demos, &simulate_demos(&demos, &observer)?);
     }
     if let Some(path) = &args.mcap {
-        check_output_file("--mcap", path, OutputFormat::Mcap)?;
+        check_output_file("--mcap", path, OutputFormat::MCAP)?;
     }
     let stored = load_one_run(dir)?;
     args.episode.find_record(&stored)?;

@@ -21,7 +21,7 @@ use softvt_runner::{
     ConfiguredScript, Runner, SuiteResult, conditions,
     experiment::{self, ExperimentOutput},
     plan_noun,
-    selection::{check_distinct_out_dirs, check_parent_folder, next_run_dir},
+    suite_selection::{check_distinct_out_dirs, check_parent_folder, next_run_dir},
 };
 use softvt_runs::{requirement::Requirement, stored_run, summary::SuiteSummary};
 use softvt_script::ExperimentRow;

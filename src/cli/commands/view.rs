@@ -27,7 +27,7 @@ use softvt_report::{
 use softvt_rollout::{FinishedEpisode, StateRecording};
 use softvt_runner::{
     ConfiguredScript, EpisodeJob, EpisodeList, PreparedRun, RunConfig, RunError, SuiteRun,
-    selection::path_component,
+    suite_selection::path_component,
 };
 use softvt_runs::{record::EpisodeRecord, run_folder::RunFolder};
 
@@ -142,20 +142,30 @@ fn has_stills(names: &[PathBuf]) -> bool {
     MOMENTS.iter().all(|moment| names.iter().any(|path| is_still(path, moment)))
 }
 
-/// Removes the files of an earlier view from a folder and from the folders of its policies.
+/// Removes the files of an earlier view from a folder, and the folders of its policies.
 fn remove_earlier(dir: &Path) -> Result<(), CliError> {
     if ![episode_page::PAGE, episode_page::FRAME].iter().all(|name| dir.join(name).is_file()) {
         return Ok(());
     }
-    remove_files(dir)?;
     for entry in entries(dir)? {
         if is_policy_folder(&entry)? {
-            remove_files(&entry)?;
+            entries(&entry)?
+                .iter()
+                .filter(|path| is_of_view(path))
+                .try_for_each(|path| files::remove_if_present(path))?;
             // One with other files stays.
             let _ = std::fs::remove_dir(&entry);
+        } else if is_of_view(&entry) {
+            files::remove_if_present(&entry)?;
         }
     }
     Ok(())
+}
+
+/// True for a file with a name that views write.
+fn is_of_view(path: &Path) -> bool {
+    let is_named = FILES.iter().any(|name| path.ends_with(name));
+    path.is_file() && (is_named || MOMENTS.iter().any(|moment| is_still(path, moment)))
 }
 
 /// True for a folder with the stills of a policy. Other than a view of its own, it has no picture of the result.
@@ -176,17 +186,6 @@ fn is_still(path: &Path, moment: &str) -> bool {
 fn entries(dir: &Path) -> Result<Vec<PathBuf>, FileError> {
     let listed = std::fs::read_dir(dir).and_then(|entries| entries.map(|entry| Ok(entry?.path())).collect());
     listed.map_err(FileError::io("read", dir))
-}
-
-/// Removes the files that a view writes into a folder.
-fn remove_files(dir: &Path) -> Result<(), CliError> {
-    for path in entries(dir)? {
-        let name = path.file_name().and_then(|name| name.to_str()).unwrap_or_default();
-        if path.is_file() && (FILES.contains(&name) || MOMENTS.iter().any(|moment| is_still(&path, moment))) {
-            files::remove_if_present(&path)?;
-        }
-    }
-    Ok(())
 }
 
 /// An episode with its states.

@@ -15,8 +15,8 @@ use crate::{
 };
 use softvt_common::{episode_id::EpisodeSplit, text::hex};
 use softvt_runner::{
-    ConfiguredScript, Observer, RunConfig, replay::recorded_config, selection::suites_of,
-    stored_folder::enter_for_run,
+    ConfiguredScript, Observer, RunConfig, replay::recorded_config, stored_folder::enter_for_run,
+    suite_selection::suites_of,
 };
 use softvt_runs::stored_run::StoredRun;
 use softvt_watch::{Program, Selection, Watch};

@@ -15,8 +15,8 @@ use crate::{
     error::RunError,
     policy::{ControllerFactory, PolicyConfig},
     recording::{HoldingLog, RecordingOptions, RecordingSummary, SuiteRecording, record_all},
-    selection::select_suites,
     suite_run::SuiteRun,
+    suite_selection::select_suites,
 };
 use softvt_common::episode_id::EpisodeIndex;
 use softvt_common::{parallel, text::counted};

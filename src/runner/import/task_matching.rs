@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use crate::{config::RunConfig, error::RunError, selection::select_tasks};
+use crate::{config::RunConfig, error::RunError, suite_selection::select_tasks};
 use softvt_benchmark::{Suite, Task};
 use softvt_dataset::import::{ForeignDemo, ForeignFile, ForeignFormat, ForeignTask, InitialCondition};
 

@@ -44,8 +44,8 @@ const NOT_COMPARABLE: &str = "only policy servers and policies in Lua can be com
 const HEADINGS: [&str; 9] =
     ["answer", "follows", "scale", "offset", "rate", "lag", "residual", "motion", "deviates"];
 
-const LEGEND: &str = "\nanswer = scale · followed quantity + offset. Δ: from the observed pose. Rate: control steps per action. \
-                      Lag: control steps\nby which the answers are late. Motion: of the demonstrations, which the residual compares with.\n";
+const LEGEND: &str = "\nanswer = scale · followed quantity + offset. Δ: from the observed pose. Rate: control steps per action. Lag: control\n\
+                      steps by which the answers are late. Residual and motion of the demonstrations: root mean squares.\n";
 
 /// Agreement of a policy with demonstrations.
 #[derive(Clone, Debug, PartialEq, Serialize)]

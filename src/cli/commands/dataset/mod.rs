@@ -200,7 +200,7 @@ fn run_stats(args: &DatasetStatsArgs) -> Result<(), CliError> {
     let path = &args.path;
     let default = if path.is_dir() { path.join("stats.svg") } else { path.with_extension("stats.svg") };
     let out = args.out.clone().unwrap_or(default);
-    check_output_file("--out", &out, OutputFormat::Svg)?;
+    check_output_file("--out", &out, OutputFormat::SVG)?;
     check_complete(path)?;
     let mut paths: Vec<PathBuf> = demos_of(path)?.into_iter().map(|demo| demo.file).collect();
     paths.dedup();
