@@ -9,9 +9,9 @@ use std::{
 use softvt_common::parallel::lock;
 use softvt_geometry::{Quat, Vec3};
 use softvt_policy::{
-    Action, ActionChunk, CommandResolver, EncodedGrip, EpisodeBrief, GripTarget, Observation, Policy,
-    PolicyError, SensorStreams, ToolCommand, ToolMotion, decode,
-    profile::{ActionEncoding, GripCode, GripperValues, PoseEncoding},
+    Action, ActionChunk, CommandResolver, EpisodeBrief, Observation, Policy, PolicyError, SensorStreams,
+    ToolCommand, ToolMotion, decode,
+    profile::{ActionEncoding, GripCode, GripperValues},
 };
 use softvt_robot::{ik::ArmAngles, rotation};
 use softvt_rollout::{Controller, Simulation};
@@ -61,7 +61,8 @@ pub struct DemoSamples {
 #[derive(Clone, Debug)]
 struct PendingCommand {
     command: ToolCommand,
-    row: Option<Vec<f64>>,
+    /// Its closure in the values of the encoding, if it was decoded from numbers.
+    closure: Option<f64>,
 }
 
 /// A controller that asks a policy, compares its answers with the recorded steps of one demonstration, and executes the
@@ -146,11 +147,12 @@ impl AnswerComparison {
         } else if self.policy.observes_every_step() {
             self.policy.observe(observation)?;
         }
-        let Some(PendingCommand { command, row }) = self.pending.pop_front() else {
+        let Some(PendingCommand { command, closure }) = self.pending.pop_front() else {
             return Err(PolicyError::Response("has no action at all".to_owned()));
         };
         let answered = self.resolver.resolve(observation, command);
         let robot = &observation.robot;
+        let of_vectors = |linear: Vec3, angular: Vec3| linear.iter().chain(&angular).copied().collect();
         lock(&self.samples).steps.push(StepSample {
             request: self.request,
             tool: robot.ee_position_b,
@@ -158,8 +160,12 @@ impl AnswerComparison {
             measured_joints: robot.joints,
             answered,
             is_step: matches!(command.motion, ToolMotion::Delta { .. }),
-            numbers: self.numbers(row.as_deref(), &answered),
-            closure: self.closure(&command, row.as_deref(), &answered),
+            numbers: match command.motion {
+                ToolMotion::Pose { position_b, axis_angle_b } => of_vectors(position_b, axis_angle_b),
+                ToolMotion::Delta { translation_b, rotation_b, .. } => of_vectors(translation_b, rotation_b),
+                ToolMotion::Joints(joints) => joints.to_vec(),
+            },
+            closure: closure.unwrap_or_else(|| answered.closure()),
             recorded,
         });
         Ok(())
@@ -167,53 +173,21 @@ impl AnswerComparison {
 
     fn ask(&mut self, observation: &Observation) -> Result<(), PolicyError> {
         let asked = Instant::now();
-        let ActionChunk { mut commands, rows } = self.policy.act(observation)?;
+        let ActionChunk { commands, rows } = self.policy.act(observation)?;
         let mut samples = lock(&self.samples);
         samples.answer_s.push(asked.elapsed().as_secs_f64());
         self.request = samples.steps.len();
+        self.pending =
+            commands.into_iter().map(|command| PendingCommand { command, closure: None }).collect();
         if let Some(encoding) = &self.encoding {
-            for (command, row) in commands.iter_mut().zip(&rows) {
-                command.motion = decode::unclamped_command(row, encoding)?.motion;
+            let GripperValues { open, closed, code, .. } = encoding.gripper;
+            for (pending, row) in self.pending.iter_mut().zip(&rows) {
+                pending.command.motion = decode::unclamped_command(row, encoding)?.motion;
+                let closure = row.last().map(|value| (value - open) / (closed - open));
+                pending.closure = closure.filter(|_| code != GripCode::Force);
             }
         }
-        let mut rows = rows.into_iter();
-        let pending = commands.into_iter().map(|command| PendingCommand { command, row: rows.next() });
-        self.pending = pending.take(self.replan).collect();
+        self.pending.truncate(self.replan);
         Ok(())
-    }
-
-    /// The numbers of a motion in m and rad; the numbers of a displacement are fractions of its limits.
-    fn numbers(&self, row: Option<&[f64]>, answered: &Action) -> Vec<f64> {
-        let (Some(encoding), Some([motion @ .., _])) = (&self.encoding, row) else {
-            return answered.joints.map_or(answered.to_array()[..6].to_vec(), |joints| joints.to_vec());
-        };
-        let limit = |i: usize| match encoding.pose {
-            PoseEncoding::Delta { translation_m, rotation_rad }
-            | PoseEncoding::DeltaOsc { translation_m, rotation_rad } => {
-                if i < 3 {
-                    translation_m
-                } else {
-                    rotation_rad
-                }
-            }
-            PoseEncoding::Absolute | PoseEncoding::Joints => 1.0,
-        };
-        let si =
-            |i: usize, number: f64| encoding.units.as_ref().map_or(number, |units| units.to_si(i, number));
-        motion.iter().enumerate().map(|(i, number)| limit(i) * si(i, *number)).collect()
-    }
-
-    /// The closure that a command means in the values of the encoding.
-    fn closure(&self, command: &ToolCommand, row: Option<&[f64]>, answered: &Action) -> f64 {
-        let values = self.encoding.as_ref().map(|encoding| encoding.gripper);
-        match (values, row.and_then(<[f64]>::last), command.grip) {
-            (Some(GripperValues { open, closed, code, .. }), Some(value), _) if code != GripCode::Force => {
-                (value - open) / (closed - open)
-            }
-            (_, _, EncodedGrip::TwoWidth(closure) | EncodedGrip::Target(GripTarget::Closure(closure))) => {
-                closure
-            }
-            _ => answered.closure(),
-        }
     }
 }
