@@ -23,7 +23,7 @@ use softvt::{
         profile::Profile,
         remote::{PolicyConnections, PolicyServer, RemotePolicy, ServerProtocol},
     },
-    rollout::{AssetCache, ChunkedPolicy, Episode, SensorAssets},
+    rollout::{AssetCache, ChunkedPolicy, Episode},
 };
 use tungstenite::{Bytes, Message, WebSocket, accept};
 
@@ -153,7 +153,7 @@ fn overheads(profile: &str) -> Vec<f64> {
         EpisodeBrief { suite, task: 0, prompt, episode: 0, seed: 0, alias: None },
         10,
     );
-    let started = Episode::start(spec, &AssetCache::default(), &SensorAssets::default()).expect("it starts");
+    let started = Episode::start(spec, &AssetCache::default()).expect("it starts");
     started.run(&mut driver).expect("it runs");
     drop(driver);
     let answers = answers.lock().expect("answers");

@@ -14,7 +14,7 @@ use cpu_time::ThreadTime;
 use softvt::{
     geometry::Pose,
     physics::world::WorldSnapshot,
-    rollout::{AssetCache, Controller, Episode, SensorAssets, StateRecording},
+    rollout::{AssetCache, Controller, Episode, StateRecording},
     scene::{Camera, CameraMount},
     script::LoadedScript,
     sensing::camera::Renderer,
@@ -28,7 +28,7 @@ const IMAGES: usize = 16;
 /// Records all states of an episode.
 fn record(loaded: &LoadedScript, task: usize) -> StateRecording {
     let (spec, mut expert) = episode::open(loaded, task, true);
-    let started = Episode::start(spec, &AssetCache::default(), &SensorAssets::default()).expect("it starts");
+    let started = Episode::start(spec, &AssetCache::default()).expect("it starts");
     started.run(&mut expert as &mut dyn Controller).expect("it runs").recording.expect("it was asked for")
 }
 

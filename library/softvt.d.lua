@@ -1870,7 +1870,7 @@ function softvt.world(spec) end
 ---@return string
 function softvt.fingerprint(asset) end
 
----Returns what is most likely a mistake in the material and the visuals of an asset, as softvt check tells it.
+---Returns what is most likely a mistake in an asset, as softvt check tells it.
 ---@param asset softvt.Asset
 ---@return string[]
 function softvt.asset_warnings(asset) end
@@ -1922,14 +1922,6 @@ function softvt.force_at(sweep, width_mm) end
 ---@return softvt.Instances
 function softvt.instances(suite) end
 
----Has the objects that an expert names checked in every scene in which its task runs, and returns the expert: `return softvt.check_names("nudge", run, spec, { object = "object" })`. The kinds of the fields of `spec` are "object" (one that moves), "place" (an object or a part), "joint" (a part, cabinet.top_drawer) and "value of joint" (a number in the range of the joint that the field `joint` names). Experts in `spec` are checked as well. softvt check reports a wrong name at the line of the file that called the function which makes the expert.
----@param label string
----@param expert fun(arm: softvt.Arm, scene: softvt.SceneState)
----@param spec table
----@param kinds table<string, string>
----@return fun(arm: softvt.Arm, scene: softvt.SceneState)
-function softvt.check_names(label, expert, spec, kinds) end
-
 ---Returns an image of one colour: `softvt.image { width = 640, height = 480, colour = { 255, 255, 255 } }`.
 ---@param spec softvt.NewImage
 ---@return softvt.Image
@@ -1944,6 +1936,14 @@ function softvt.plot(spec) end
 ---@param spec softvt.PoseSpec
 ---@return softvt.Pose
 function softvt.pose(spec) end
+
+---Has the objects that an expert names checked in every scene in which its task runs, and returns the expert: `return softvt.check_names("nudge", run, spec, { object = "object" })`. The kinds of the fields of `spec` are "object" (one that moves), "place" (an object or a part), "joint" (a part, cabinet.top_drawer) and "value of joint" (a number in the range of the joint that the field `joint` names). Experts in `spec` are checked as well. softvt check reports a wrong name at the line of the file that called the function which makes the expert.
+---@param label string
+---@param expert fun(arm: softvt.Arm, scene: softvt.SceneState)
+---@param spec table
+---@param kinds table<string, "object"|"place"|"joint"|"value of joint">
+---@return fun(arm: softvt.Arm, scene: softvt.SceneState)
+function softvt.check_names(label, expert, spec, kinds) end
 
 ---Reads a shape from an OBJ, STL or GLB file: `softvt.mesh { file = "mug.obj", scale = 0.001 }`. The surface must be closed. An asset without visuals has the colours and images of the materials in the file: Kd and map_Kd of the MTL files that an OBJ file names, or the base colours of a GLB file; images are PNG or JPEG. All objects of the file are one shape; of a GLB file those of its default scene. Vertices within 1e-6 of the diagonal are one where the surface is open without that.
 ---@param spec softvt.MeshSpec

@@ -227,7 +227,7 @@ local function no_limit(name, found)
   if not found.tau or found.tau >= LEAST_TAU then return nil end
   local cause = "it is too stiff to be deformed; check youngs_pa, in Pa, or use softvt.rigid"
   for _, warning in ipairs(softvt.asset_warnings(assets[name])) do
-    if warning:find "^youngs_pa" then cause = warning end
+    if warning:find "youngs_pa: " then cause = warning end
   end
   return ("%s: τ is %.2g %%, below what the simulation resolves: %s; no file of it is written"):format(
     name,

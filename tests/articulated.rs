@@ -7,7 +7,7 @@ use softvt::{
     geometry::Vec3,
     physics::{BodyId, ContactPartner, LinkId, world::JointDrive},
     robot::tactile::TactileSpec,
-    rollout::{AssetCache, ObjectInstance, SensorAssets, Sensors, Simulation, state_hash},
+    rollout::{AssetCache, ObjectInstance, Sensors, Simulation, state_hash},
     scene::{Asset, Camera, Scene},
     script::{self, EpisodeSetup, SceneChanges},
 };
@@ -120,7 +120,7 @@ fn a_bowl_rests_in_an_open_drawer_and_all_bodies_fall_asleep() {
 fn a_pushed_drawer_carries_its_bowl_and_moves_in_images() {
     let mut sim = settled();
     let link = link(&sim, "cabinet.top_drawer");
-    let mut senses = Sensors::new(&sim, &TactileSpec::default(), &SensorAssets::default());
+    let mut senses = Sensors::new(&sim, &TactileSpec::default(), &AssetCache::default());
     let camera = Camera { width: 160, height: 160, ..Camera::third_person_table() };
     let drawer = 1 + sim.objects.iter().position(|o| o.name == "cabinet.top_drawer").expect("a part") as u16;
     let mut column = |sim: &Simulation| {

@@ -12,7 +12,7 @@ use softvt::{
     geometry::{Pose, Quat, Vec3, shape::Shape},
     physics::{BodyId, PhysicsParams},
     robot::{RobotSpec, tactile::TactileSpec},
-    rollout::{AssetCache, SensorAssets, Sensors, Simulation},
+    rollout::{AssetCache, Sensors, Simulation},
     scene::{Camera, Lighting, Mask, Visual, VisualLayer},
     script,
     sensing::camera::{FrameView, RenderMesh, RenderObject, RenderScene, RenderedImage, Renderer},
@@ -60,7 +60,7 @@ fn the_first_task_of_spatial_soft_matches_its_reference() {
         &AssetCache::default(),
     )
     .expect("the scene builds");
-    let assets = SensorAssets::default();
+    let assets = AssetCache::default();
     let new_sensors = || Sensors::new(&sim, &TactileSpec::default(), &assets);
     let mut sensors = new_sensors();
     let frame = Sensors::frame(&sim);

@@ -66,13 +66,13 @@ pub enum Goal {
         name: String,
     },
     /// All of these hold at once.
-    All(Parts),
+    All(SubGoals),
     /// At least one of these holds.
-    Any(Parts),
+    Any(SubGoals),
     /// None of these holds.
-    None(Parts),
+    None(SubGoals),
     /// Each of these has held once after the one before it had; the last one holds.
-    Sequence(Parts),
+    Sequence(SubGoals),
 }
 
 /// An object, what it is placed relative to, and for how long.
@@ -88,7 +88,7 @@ pub struct Placement {
 
 /// Goals that are combined.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Parts {
+pub struct SubGoals {
     /// In order.
     pub goals: Vec<Goal>,
 }
@@ -180,7 +180,7 @@ impl Goal {
             let range = shares.map(|share| rounded(low + share * (high - low)));
             Some(Self::Turned { joint: joint.clone(), range })
         };
-        let parts = |parts: &Parts| Parts {
+        let parts = |parts: &SubGoals| SubGoals {
             goals: parts.goals.iter().map(|goal| goal.with_joint_ranges(limits)).collect(),
         };
         match self {
@@ -198,7 +198,7 @@ impl Goal {
     /// Description of the goal: "bun in cabinet.top_drawer". A sequence within another combination is in parentheses,
     /// so that goals of other meaning differ in text.
     pub fn describe(&self) -> String {
-        let joined = |parts: &Parts, word: &str| {
+        let joined = |parts: &SubGoals, word: &str| {
             let part = |goal: &Self| match goal {
                 Self::Sequence(steps) if steps.goals.len() > 1 && parts.goals.len() > 1 => {
                     format!("({})", goal.describe())
@@ -237,7 +237,7 @@ mod tests {
     fn goals_of_other_meaning_have_other_descriptions() {
         let named = |name: &str| Goal::Predicate { name: name.into() };
         let (a, b) = (|| named("A"), || named("B"));
-        let of = |goals: Vec<Goal>| Parts { goals };
+        let of = |goals: Vec<Goal>| SubGoals { goals };
         let all = |goals| Goal::All(of(goals));
         let sequence = |goals| Goal::Sequence(of(goals));
         let not_a = || Goal::None(of(vec![a()]));

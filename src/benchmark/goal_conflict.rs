@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use softvt_common::text::significant;
 
-use crate::goal::{Goal, Parts, Placement, Side};
+use crate::goal::{Goal, Placement, SubGoals};
 
 /// The reason for which a goal can never be met, in words; `None` if none was found.
 ///
@@ -32,7 +32,7 @@ pub fn conflict(goal: &Goal) -> Option<String> {
 
 /// Least time that a goal takes, s: its predicates must hold for a time.
 pub fn least_time(goal: &Goal) -> f64 {
-    let times = |parts: &Parts| parts.goals.iter().map(least_time).collect::<Vec<_>>();
+    let times = |parts: &SubGoals| parts.goals.iter().map(least_time).collect::<Vec<_>>();
     match goal {
         Goal::On(of) | Goal::Inside(of) | Goal::Near { of, .. } | Goal::Beside { of, .. } => of.hold_s,
         Goal::Upright { hold_s, .. } => *hold_s,
@@ -46,7 +46,7 @@ pub fn least_time(goal: &Goal) -> f64 {
 
 /// Least time after which a goal can have been false for as long as it would have to hold, s.
 fn least_time_without(goal: &Goal) -> f64 {
-    let times = |parts: &Parts| parts.goals.iter().map(least_time_without).collect::<Vec<_>>();
+    let times = |parts: &SubGoals| parts.goals.iter().map(least_time_without).collect::<Vec<_>>();
     match goal {
         Goal::All(parts) => times(parts).into_iter().reduce(f64::min).unwrap_or(0.0),
         Goal::Any(parts) => times(parts).into_iter().fold(0.0, f64::max),
@@ -61,7 +61,7 @@ struct Moment<'a> {
     required: Vec<&'a Goal>,
     forbidden: Vec<&'a Goal>,
     /// Of each list, one must hold.
-    alternatives: Vec<&'a Parts>,
+    alternatives: Vec<&'a SubGoals>,
     /// Earlier steps of sequences, each of which must hold at a moment of its own.
     earlier: Vec<&'a Goal>,
 }
@@ -149,70 +149,67 @@ fn circle_from<'a>(supports: &BTreeMap<&'a str, Vec<&'a str>>, path: Vec<&'a str
     further.into_iter().find_map(|next| circle_from(supports, path.iter().copied().chain([*next]).collect()))
 }
 
-/// True if two predicates can never hold at once.
+/// A quantity of a scene that predicates bound. Pairs of objects are in alphabetical order.
+#[derive(PartialEq)]
+enum Quantity<'a> {
+    /// Share of the range of a joint.
+    JointShare(&'a str),
+    /// Value of a joint, m or rad.
+    JointValue(&'a str),
+    /// Angle between the z axis of an object and the vertical, rad.
+    Tilt(&'a str),
+    /// Distance of two objects, m.
+    Distance([&'a str; 2]),
+    /// Number of the side of the second object on which the first one is. Each is within 45° of its direction.
+    Side([&'a str; 2]),
+}
+
+/// The lowest and highest values of the quantities that a predicate bounds, while it holds.
+fn bounds(goal: &Goal) -> Vec<(Quantity<'_>, [f64; 2])> {
+    let is_sorted = |of: &Placement| of.object <= of.target;
+    match goal {
+        Goal::Opened { joint, share } => vec![(Quantity::JointShare(joint), [*share, 1.0])],
+        Goal::Closed { joint, share } => vec![(Quantity::JointShare(joint), [0.0, *share])],
+        Goal::Turned { joint, range } => vec![(Quantity::JointValue(joint), *range)],
+        Goal::Upright { object, angle_rad, .. } => vec![(Quantity::Tilt(object), [0.0, *angle_rad])],
+        Goal::Near { of, distance_m } => vec![(Quantity::Distance(pair(of)), [0.0, *distance_m])],
+        Goal::Beside { side, of, distance_m } => {
+            let side = f64::from(if is_sorted(of) { *side } else { side.opposite() } as u8);
+            vec![
+                (Quantity::Distance(pair(of)), [*distance_m, f64::INFINITY]),
+                (Quantity::Side(pair(of)), [side; 2]),
+            ]
+        }
+        _ => Vec::new(),
+    }
+}
+
+/// The two objects of a placement.
+fn pair(of: &Placement) -> [&str; 2] {
+    let mut pair = [of.object.as_str(), of.target.as_str()];
+    pair.sort_unstable();
+    pair
+}
+
+/// True if two predicates can never hold at once: they bound a quantity to ranges that are apart.
 fn excludes(first: &Goal, other: &Goal) -> bool {
-    match (first, other) {
-        (Goal::Opened { joint, share }, Goal::Closed { joint: same, share: most })
-        | (Goal::Closed { joint, share: most }, Goal::Opened { joint: same, share }) => {
-            joint == same && share > most
-        }
-        (Goal::Turned { joint, range: [low, high] }, Goal::Turned { joint: same, range: [from, to] }) => {
-            joint == same && (low > to || from > high)
-        }
-        // Both are within 45° of their directions.
-        (Goal::Beside { side, of, .. }, Goal::Beside { side: another, of: same, .. }) => {
-            side_in_pair(*another, same, of).is_some_and(|another| another != *side)
-        }
-        (Goal::Near { of, distance_m: most }, Goal::Beside { side, of: same, distance_m: least })
-        | (Goal::Beside { side, of, distance_m: least }, Goal::Near { of: same, distance_m: most }) => {
-            side_in_pair(*side, of, same).is_some() && least > most
-        }
-        _ => false,
-    }
+    let others = bounds(other);
+    bounds(first).iter().any(|(quantity, [low, high])| {
+        others.iter().any(|(same, [from, to])| quantity == same && (low > to || from > high))
+    })
 }
 
-/// True if a predicate that holds makes another one of the same two objects, the same object or the same joint hold.
+/// True if a predicate that holds makes another one hold, which bounds the same quantities to wider ranges, of the same
+/// object, which the robot does not touch, and for no longer.
 fn implies(holds: &Goal, other: &Goal) -> bool {
-    match (holds, other) {
-        (Goal::Near { of, distance_m }, Goal::Near { of: same, distance_m: most }) => {
-            placement_implies(of, same) && distance_m <= most
-        }
-        (
-            Goal::Beside { side, of, distance_m },
-            Goal::Beside { side: another, of: same, distance_m: least },
-        ) => placement_implies(of, same) && side == another && distance_m >= least,
-        (
-            Goal::Upright { object, angle_rad, hold_s },
-            Goal::Upright { object: same, angle_rad: most, hold_s: shortest },
-        ) => object == same && angle_rad <= most && hold_s >= shortest,
-        (Goal::Opened { joint, share }, Goal::Opened { joint: same, share: least }) => {
-            joint == same && share >= least
-        }
-        (Goal::Closed { joint, share }, Goal::Closed { joint: same, share: most }) => {
-            joint == same && share <= most
-        }
-        (Goal::Turned { joint, range: [low, high] }, Goal::Turned { joint: same, range: [from, to] }) => {
-            joint == same && from <= low && high <= to
-        }
-        _ => false,
-    }
-}
-
-/// True if what holds as long as `of` asks holds as long as `other` asks: of the same object, which the robot does not
-/// touch, and the same target.
-fn placement_implies(of: &Placement, other: &Placement) -> bool {
-    (&of.object, &of.target) == (&other.object, &other.target) && of.hold_s >= other.hold_s
-}
-
-/// True if two placements are about the same two objects, in any order.
-fn is_same_pair(of: &Placement, other: &Placement) -> bool {
-    [(&of.object, &of.target), (&of.target, &of.object)].contains(&(&other.object, &other.target))
-}
-
-/// The side on which the object of `as_in` is of its target, if the objects of `of` are the same two and its object is
-/// on `side` of its target.
-fn side_in_pair(side: Side, of: &Placement, as_in: &Placement) -> Option<Side> {
-    is_same_pair(of, as_in).then(|| if of.object == as_in.object { side } else { side.opposite() })
+    let (own, others) = (bounds(holds), bounds(other));
+    let follows = |(quantity, [from, to]): &(Quantity<'_>, [f64; 2])| {
+        own.iter().any(|(same, [low, high])| quantity == same && from <= low && high <= to)
+    };
+    holds.object() == other.object()
+        && least_time(holds) >= least_time(other)
+        && !others.is_empty()
+        && others.iter().all(follows)
 }
 
 /// A predicate with the limit that tells it from others of the same words.
@@ -232,6 +229,7 @@ fn with_limit(goal: &Goal) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::goal::Side;
 
     fn on(object: &str, target: &str) -> Goal {
         Goal::On(Placement { object: object.into(), target: target.into(), hold_s: 0.4 })
@@ -255,19 +253,19 @@ mod tests {
     }
 
     fn all(goals: Vec<Goal>) -> Goal {
-        Goal::All(Parts { goals })
+        Goal::All(SubGoals { goals })
     }
 
     fn any(goals: Vec<Goal>) -> Goal {
-        Goal::Any(Parts { goals })
+        Goal::Any(SubGoals { goals })
     }
 
     fn none(goals: Vec<Goal>) -> Goal {
-        Goal::None(Parts { goals })
+        Goal::None(SubGoals { goals })
     }
 
     fn sequence(goals: Vec<Goal>) -> Goal {
-        Goal::Sequence(Parts { goals })
+        Goal::Sequence(SubGoals { goals })
     }
 
     #[test]

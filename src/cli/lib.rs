@@ -16,10 +16,7 @@ mod tests;
 use std::{
     panic,
     process::ExitCode,
-    sync::{
-        Arc,
-        atomic::{AtomicBool, Ordering},
-    },
+    sync::atomic::{AtomicBool, Ordering},
     thread,
     time::Duration,
 };
@@ -53,11 +50,6 @@ pub fn main() -> ExitCode {
 }
 
 fn run_process() -> Result<(), CliError> {
-    // Finished episodes are already on disk, and nothing can interrupt a C function of Lua that does not return.
-    softvt_script::set_stuck_handler(Arc::new(|message| {
-        eprint_notice(message);
-        std::process::exit(2);
-    }));
     handle_interrupts();
     cache::share();
     let words: Vec<String> = std::env::args_os()

@@ -2,7 +2,7 @@
 
 use super::text::{exact_number, format_number};
 
-/// Bounds of a finite number; either end may be excluded.
+/// Bounds of a finite number, of which either end may be excluded, and the usual values within them.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Range {
     /// Lower bound.
@@ -13,6 +13,10 @@ pub struct Range {
     pub above_min: bool,
     /// True if `max` itself is refused.
     pub below_max: bool,
+    /// Smallest usual value.
+    pub usual_min: f64,
+    /// Largest usual value.
+    pub usual_max: f64,
 }
 
 /// Error of a parameter out of its range.
@@ -29,8 +33,14 @@ pub struct RangeError {
 
 impl Range {
     /// Any finite number.
-    pub const ANY: Self =
-        Self { min: f64::NEG_INFINITY, max: f64::INFINITY, above_min: false, below_max: false };
+    pub const ANY: Self = Self {
+        min: f64::NEG_INFINITY,
+        max: f64::INFINITY,
+        above_min: false,
+        below_max: false,
+        usual_min: f64::NEG_INFINITY,
+        usual_max: f64::INFINITY,
+    };
     /// Greater than zero.
     pub const POSITIVE: Self = Self { min: 0.0, above_min: true, ..Self::ANY };
     /// Zero or greater.
@@ -43,22 +53,48 @@ impl Range {
 
     /// From `min` to `max`, both included.
     pub const fn closed(min: f64, max: f64) -> Self {
-        Self { min, max, above_min: false, below_max: false }
+        Self { min, max, ..Self::ANY }
     }
 
     /// From `min` (included) to `max` (excluded).
     pub const fn below(min: f64, max: f64) -> Self {
-        Self { min, max, above_min: false, below_max: true }
+        Self { min, max, below_max: true, ..Self::ANY }
     }
 
     /// From `min` (excluded) to `max` (included).
     pub const fn above(min: f64, max: f64) -> Self {
-        Self { min, max, above_min: true, below_max: false }
+        Self { min, max, above_min: true, ..Self::ANY }
     }
 
     /// From `min` to `max`, both included; an end that is `None` is open.
     pub fn between(min: Option<f64>, max: Option<f64>) -> Self {
         Self::closed(min.unwrap_or(f64::NEG_INFINITY), max.unwrap_or(f64::INFINITY))
+    }
+
+    /// The same bounds, with the usual values from `min` to `max`. Others are valid, and most likely in another unit.
+    pub const fn usually(self, min: f64, max: f64) -> Self {
+        Self { usual_min: min, usual_max: max, ..self }
+    }
+
+    /// True if some valid values are not usual.
+    pub fn has_usual(&self) -> bool {
+        self.usual_min > f64::NEG_INFINITY || self.usual_max < f64::INFINITY
+    }
+
+    /// Describes a value outside of the usual range, and the unit prefix that would bring it inside. `None` for a usual
+    /// value.
+    pub fn unusual(&self, value: f64, unit: &str) -> Option<String> {
+        /// Kilo and milli, centimetres and percent.
+        const FACTORS: [f64; 4] = [1e3, 1e-3, 1e-2, 1e2];
+        let usual = Self::closed(self.usual_min, self.usual_max);
+        if usual.contains(value) || !value.is_finite() {
+            return None;
+        }
+        let unit = if unit.is_empty() { String::new() } else { format!(" {unit}") };
+        let inside = FACTORS.iter().find(|factor| usual.contains(value * **factor));
+        let hint = inside.map_or(String::new(), |factor| format!("; ×{factor} would be inside"));
+        let [value, min, max] = [value, self.usual_min, self.usual_max].map(format_number);
+        Some(format!("{value}{unit} is outside of the usual range {min}..{max}{unit}{hint}"))
     }
 
     /// True if `value` is finite and within the bounds.
@@ -131,6 +167,19 @@ mod tests {
     fn a_value_outside_of_a_range_is_not_rounded_into_it() {
         let shown = |value| Range::closed(0.0, 1.0).show_outside(value);
         assert_eq!([1.0 + 1e-15, 1.0 + 0.1 + 0.2].map(shown), ["1.000000000000001", "1.3"]);
+    }
+
+    #[test]
+    fn a_value_in_another_unit_is_unusual_and_the_factor_is_named() {
+        let youngs = Range::POSITIVE.usually(300.0, 1e7);
+        assert_eq!([300.0, 2e4, 1e7].map(|value| youngs.unusual(value, "Pa")), [None, None, None]);
+        let doubted = youngs.unusual(40.0, "Pa").expect("40 kPa");
+        assert_eq!(doubted, "40 Pa is outside of the usual range 300..10000000 Pa; ×1000 would be inside");
+        let percent = Range::above(0.0, 1.0).usually(0.002, 0.8).unusual(1.0, "").expect("1 %");
+        assert_eq!(percent, "1 is outside of the usual range 0.002..0.8; ×0.01 would be inside");
+        let far = Range::ANY.usually(-3.0, 3.0).unusual(-1e9, "m").expect("far");
+        assert_eq!(far, "-1e9 m is outside of the usual range -3..3 m");
+        assert!(youngs.has_usual() && !Range::POSITIVE.has_usual());
     }
 
     #[test]

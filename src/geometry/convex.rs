@@ -63,7 +63,7 @@ pub struct ClosestPoints {
 }
 
 /// A primitive as a convex core with a layer around it.
-struct LayeredCore {
+struct RoundedConvex {
     core: Box<dyn SupportMap>,
     /// Frame of the core: parry's cylinders are along y, those of [`Primitive`] along z.
     frame: Pose,
@@ -72,7 +72,7 @@ struct LayeredCore {
 }
 
 impl Placed<Primitive> {
-    fn core(&self) -> Option<LayeredCore> {
+    fn core(&self) -> Option<RoundedConvex> {
         let (mut rotation, mut layer) = (Vec3::zeros(), 0.0);
         let core: Box<dyn SupportMap> = match self.shape {
             Primitive::Box { half } => Box::new(Cuboid::new(to_parry(&half))),
@@ -87,7 +87,7 @@ impl Placed<Primitive> {
             }
             Primitive::Plane | Primitive::Sphere { .. } => return None,
         };
-        Some(LayeredCore { core, frame: self.pose * Pose::new(Vec3::zeros(), rotation), radius: layer })
+        Some(RoundedConvex { core, frame: self.pose * Pose::new(Vec3::zeros(), rotation), radius: layer })
     }
 }
 

@@ -131,7 +131,7 @@ impl Mesh {
     }
 
     /// Some of the triangles with their vertices, without texture coordinates.
-    pub(crate) fn part(&self, triangles: &[[u32; 3]]) -> Self {
+    pub(crate) fn submesh(&self, triangles: &[[u32; 3]]) -> Self {
         let (mut renamed, mut vertices) = (BTreeMap::new(), Vec::new());
         let mut rename = |v: u32| {
             *renamed.entry(v).or_insert_with(|| {

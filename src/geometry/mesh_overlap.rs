@@ -139,7 +139,7 @@ pub(crate) fn check_pieces(mesh: &Mesh) -> Result<(), MeshError> {
         return Ok(());
     }
     let farthest = mesh.vertices.iter().map(|v| v.amax()).fold(0.0, f64::max);
-    let piece = |triangles: Vec<_>| Piece::new(mesh.part(&triangles), ROUNDING * farthest);
+    let piece = |triangles: Vec<_>| Piece::new(mesh.submesh(&triangles), ROUNDING * farthest);
     let pieces: Vec<Piece> = of_piece.into_values().filter_map(piece).collect();
     let boxes = pieces.iter().zip(0..).map(|(piece, group)| GroupedAabb { bounds: piece.bounds, group });
     let pairs = overlapping_pairs(&boxes.collect::<Vec<_>>());

@@ -1,147 +1,262 @@
-//! Data derived from assets, computed once and shared by all episodes.
+//! What is derived from shapes and assets: computed at its first use and shared by all episodes.
 
-use std::{convert::Infallible, sync::Arc};
+use std::{
+    convert::Infallible,
+    sync::{Arc, OnceLock},
+};
 
 use serde::{Serialize, de::DeserializeOwned};
 
-use super::{build_error::SceneBuildError, shared_cache::SharedCache, soft_model::SoftGeometry};
+use super::{
+    build_error::SceneBuildError, sensors::SensingError, shared_cache::SharedCache, soft_model::SoftGeometry,
+};
 use softvt_common::disk_cache::DiskCache;
 use softvt_geometry::{
     Aabb, Pose, Vec3,
     cavity::cavity,
     mass::{MassProperties, approximate_mass_properties, mass_properties},
     pieces::SeparatePieces,
-    shape::Shape,
-    voxel::VoxelSpec,
+    shape::{SampleContact, Shape},
+    voxel::{VoxelMesh, VoxelSpec},
 };
 use softvt_physics::{
     BodyId, World,
-    contact::{Collider, CollisionGeometry, Friction, SurfaceFeatures},
+    contact::{Collider, CollisionGeometry, ContactSurface, Friction, SurfaceFeatures},
     fem::FemModel,
 };
+use softvt_robot::tactile::TactileSpec;
 use softvt_scene::{Asset, Body, Object, SoftMaterial};
-
-/// Finite-element models of assets, and expensive queries of their shapes: bounds, mass,
-/// wall thickness, contact samples.
-#[derive(Clone, Debug, Default)]
-pub struct AssetCache {
-    models: SharedCache<Arc<Asset>, Arc<FemModel>>,
-    /// By the asset as it was declared.
-    geometries: SharedCache<Arc<Asset>, Arc<SoftGeometry>>,
-    bounds: SharedCache<Shape, Aabb>,
-    masses: SharedCache<Shape, MassProperties>,
-    solids: SharedCache<Shape, Arc<CollisionGeometry>>,
-    walls: SharedCache<Shape, Option<f64>>,
-    thicknesses: SharedCache<(Shape, ThicknessProbe), Option<f64>>,
-    cavities: SharedCache<Shape, Option<Aabb>>,
-    pieces: SharedCache<Shape, Option<SeparatePieces>>,
-    disk: DiskCache,
-    /// True to compute masses and contact samples approximately.
-    approximate: bool,
-}
+use softvt_sensing::{
+    camera::{CameraError, RenderMesh},
+    panda::RobotMeshes,
+    tactile::{TactileSensor, TactileSkin},
+};
 
 /// Voxels along the longest edge by which the pieces of a rigid body are counted.
 const PIECES_RESOLUTION: usize = 24;
 
-/// The cached value of a shape.
-fn of_shape<V: Clone>(cache: &SharedCache<Shape, V>, shape: &Shape, compute: impl FnOnce() -> V) -> V {
-    let Ok(value) = cache.get(shape, |known| known == shape, || Ok::<_, Infallible>(compute()));
-    value
+/// A shape with what is derived from it. Values that take long are kept on disk.
+#[derive(Debug)]
+pub(super) struct DerivedShape {
+    shape: Shape,
+    disk: DiskCache,
+    bounds: OnceLock<Aabb>,
+    mass: OnceLock<MassProperties>,
+    rough_mass: OnceLock<MassProperties>,
+    wall: OnceLock<Option<f64>>,
+    cavity: OnceLock<Option<Aabb>>,
+    pieces: OnceLock<Option<SeparatePieces>>,
+    solid: OnceLock<Arc<CollisionGeometry>>,
 }
 
 /// The stored value of this kind for a shape.
 fn stored<V: Serialize + DeserializeOwned>(
     disk: &DiskCache,
     kind: &'static str,
-    shape: &Shape,
+    inputs: &impl Serialize,
     compute: impl FnOnce() -> V,
 ) -> V {
-    let Ok(value) = disk.get(kind, shape, || Ok::<_, Infallible>(compute()));
+    let Ok(value) = disk.get(kind, inputs, || Ok::<_, Infallible>(compute()));
     value
 }
 
-impl AssetCache {
-    /// An empty cache that keeps what takes long in `disk`; by default in the cache of the process.
-    pub fn stored_in(disk: DiskCache) -> Self {
-        Self { disk, ..Self::default() }
+impl DerivedShape {
+    fn new(shape: &Shape, disk: &DiskCache) -> Self {
+        Self {
+            shape: shape.clone(),
+            disk: disk.clone(),
+            bounds: OnceLock::new(),
+            mass: OnceLock::new(),
+            rough_mass: OnceLock::new(),
+            wall: OnceLock::new(),
+            cavity: OnceLock::new(),
+            pieces: OnceLock::new(),
+            solid: OnceLock::new(),
+        }
     }
 
-    /// A cache for scenes that are checked, and at most settle: expensive values are approximate.
-    pub fn approximate() -> Self {
-        Self { approximate: true, ..Self::default() }
-    }
-
-    /// Bounds of a shape.
-    pub(super) fn bounds(&self, shape: &Shape) -> Aabb {
-        of_shape(&self.bounds, shape, || stored(&self.disk, "bounds", shape, || shape.bounds()))
-    }
-
-    /// Mass properties of a shape at a uniform density, kg/m³.
-    pub(super) fn mass(&self, shape: &Shape, density: f64) -> MassProperties {
-        let unit = of_shape(&self.masses, shape, || match self.approximate {
-            true => stored(&self.disk, "rough-mass", shape, || approximate_mass_properties(shape, 1.0)),
-            false => stored(&self.disk, "mass", shape, || mass_properties(shape, 1.0)),
-        });
-        MassProperties { mass: unit.mass * density, com: unit.com, inertia: unit.inertia * density }
-    }
-
-    /// Typical thickness of the thin walls of a shape, m; see [`thin_wall`].
-    pub(super) fn wall(&self, shape: &Shape) -> Option<f64> {
-        of_shape(&self.walls, shape, || stored(&self.disk, "wall", shape, || thin_wall(shape)))
-    }
-
-    /// Typical thickness of the thin parts of a shape that a probe finds, m; `None` if it has few.
-    pub(super) fn thickness(&self, shape: &Shape, probe: ThicknessProbe) -> Option<f64> {
-        let compute = || Ok::<_, Infallible>(thin_parts(shape, probe));
-        let Ok(thickness) = self.thicknesses.get(
-            &(shape.clone(), probe),
-            |(known, of)| *of == probe && known == shape,
-            || self.disk.get("thickness", &(shape, probe), compute),
-        );
-        thickness
-    }
-
-    /// Box around the cavity of a shape, object frame; see [`cavity`].
-    pub(super) fn cavity(&self, shape: &Shape) -> Option<Aabb> {
-        of_shape(&self.cavities, shape, || stored(&self.disk, "cavity", shape, || cavity(shape)))
-    }
-
-    /// Separate pieces of a shape; gaps below a voxel are not seen.
-    pub(super) fn pieces(&self, shape: &Shape) -> Option<SeparatePieces> {
-        let find = || SeparatePieces::of_shape(shape, &VoxelSpec { resolution: PIECES_RESOLUTION });
-        of_shape(&self.pieces, shape, || stored(&self.disk, "pieces", shape, find))
-    }
-
-    /// A collider of a hard shape at `pose_in_parent` on `parent`.
-    pub(super) fn collider(
+    fn stored<V: Serialize + DeserializeOwned>(
         &self,
+        kind: &'static str,
+        compute: impl FnOnce(&Shape) -> V,
+    ) -> V {
+        stored(&self.disk, kind, &self.shape, || compute(&self.shape))
+    }
+
+    /// Tight bounds.
+    fn bounds(&self) -> Aabb {
+        let search = || self.stored("bounds", Shape::bounds);
+        *self.bounds.get_or_init(|| self.shape.closed_bounds().unwrap_or_else(search))
+    }
+
+    /// Mass properties at a uniform density of 1 kg/m³.
+    fn unit_mass(&self, approximate: bool) -> &MassProperties {
+        match approximate {
+            true => self
+                .rough_mass
+                .get_or_init(|| self.stored("rough-mass", |shape| approximate_mass_properties(shape, 1.0))),
+            false => self.mass.get_or_init(|| self.stored("mass", |shape| mass_properties(shape, 1.0))),
+        }
+    }
+
+    /// Typical thickness of its thin walls, m; see [`thin_wall`].
+    pub(super) fn wall(&self) -> Option<f64> {
+        *self.wall.get_or_init(|| self.stored("wall", thin_wall))
+    }
+
+    /// Typical thickness of the thin parts that a probe finds, m; `None` if it has few. Kept on disk alone.
+    pub(super) fn thickness(&self, probe: ThicknessProbe) -> Option<f64> {
+        stored(&self.disk, "thickness", &(&self.shape, probe), || thin_parts(&self.shape, probe))
+    }
+
+    /// Box around its cavity, object frame; see [`cavity`].
+    pub(super) fn cavity(&self) -> Option<Aabb> {
+        *self.cavity.get_or_init(|| self.stored("cavity", cavity))
+    }
+
+    /// Its separate pieces; gaps below a voxel are not seen.
+    pub(super) fn pieces(&self) -> Option<SeparatePieces> {
+        let find =
+            |shape: &Shape| SeparatePieces::of_shape(shape, &VoxelSpec { resolution: PIECES_RESOLUTION });
+        *self.pieces.get_or_init(|| self.stored("pieces", find))
+    }
+
+    /// Its geometry for contact with other hard bodies.
+    fn solid(&self) -> Arc<CollisionGeometry> {
+        let make = || {
+            let (disk, shape) = (self.disk.clone(), self.shape.clone());
+            let features = move || stored(&disk, "features", &shape, || SurfaceFeatures::of(&shape));
+            Arc::new(CollisionGeometry::with_features(&self.shape, features))
+        };
+        self.solid.get_or_init(make).clone()
+    }
+
+    /// A collider of a hard body at `pose_in_parent` on `parent`.
+    pub(super) fn collider(
+        self: &Arc<Self>,
         world: &World,
         name: &str,
         parent: BodyId,
         pose_in_parent: Pose,
-        shape: &Shape,
         friction: Friction,
     ) -> Collider {
         Collider {
             name: name.to_owned(),
             parent,
             pose_in_parent,
-            surface: Arc::new(shape.clone()),
+            surface: self.clone(),
             friction,
             stiffness: world.rigid_surface_stiffness(),
-            bounds: self.bounds(shape),
+            bounds: self.bounds(),
             base_of: None,
-            collision_geometry: Some(of_shape(&self.solids, shape, || {
-                Arc::new(self.collision_geometry(shape))
-            })),
+            collision_geometry: Some(self.solid()),
         }
     }
+}
 
-    fn collision_geometry(&self, shape: &Shape) -> CollisionGeometry {
-        let (disk, own) = (self.disk.clone(), shape.clone());
-        CollisionGeometry::with_features(shape, move || {
-            stored(&disk, "features", &own, || SurfaceFeatures::of(&own))
-        })
+impl ContactSurface for DerivedShape {
+    fn contact(&self, p: &Vec3, facing: &Vec3, spacing: f64) -> SampleContact {
+        self.shape.contact(p, facing, spacing)
+    }
+
+    fn is_farther(&self, p: &Vec3, reach: f64) -> bool {
+        self.shape.is_farther(p, reach)
+    }
+
+    fn bounds(&self) -> Aabb {
+        Self::bounds(self)
+    }
+
+    fn collision_geometry(&self) -> Option<CollisionGeometry> {
+        Some(CollisionGeometry::new(&self.shape))
+    }
+}
+
+/// Everything that is derived from the shapes and assets of a script: geometry, finite-element models, meshes and
+/// skins, with the models of robot and tactile sensors. A clone shares the values.
+#[derive(Clone, Debug)]
+pub struct AssetCache {
+    entries: Arc<CacheEntries>,
+    /// True to compute masses and contact samples approximately.
+    approximate: bool,
+}
+
+#[derive(Debug)]
+struct CacheEntries {
+    disk: DiskCache,
+    shapes: SharedCache<Shape, Arc<DerivedShape>>,
+    /// By the asset as it was declared. True if approximate, here and below.
+    geometries: SharedCache<(Arc<Asset>, bool), Arc<SoftGeometry>>,
+    models: SharedCache<(Arc<Asset>, bool), Arc<FemModel>>,
+    meshes: SharedCache<Arc<Asset>, Arc<RenderMesh>>,
+    skins: SharedCache<Arc<Asset>, Arc<TactileSkin>>,
+    sensors: SharedCache<TactileSpec, Arc<TactileSensor>>,
+    robot: SharedCache<(), Arc<RobotMeshes>>,
+}
+
+/// Maximum number of entries. A suite has a few dozen assets, but a layout with random appearance adds new ones of
+/// several megabytes in every episode.
+const MAX_ENTRIES: usize = 64;
+/// Maximum number of shapes, which scripts make many of on the way to those of their assets.
+const MAX_SHAPES: usize = 256;
+/// Maximum number of skins, of some 7 MB each: in suites whose objects vary, no episode needs those of another.
+/// Episodes keep their own.
+const MAX_SKINS: usize = 8;
+
+/// A cache that keeps what takes long in the disk cache of the process.
+impl Default for AssetCache {
+    fn default() -> Self {
+        Self::stored_in(DiskCache::default())
+    }
+}
+
+impl AssetCache {
+    /// An empty cache that keeps what takes long in `disk`.
+    pub fn stored_in(disk: DiskCache) -> Self {
+        let entries = CacheEntries {
+            disk,
+            shapes: SharedCache::new(MAX_SHAPES),
+            geometries: SharedCache::new(MAX_ENTRIES),
+            models: SharedCache::new(MAX_ENTRIES),
+            meshes: SharedCache::new(MAX_ENTRIES),
+            skins: SharedCache::new(MAX_SKINS),
+            sensors: SharedCache::new(MAX_ENTRIES),
+            robot: SharedCache::new(1),
+        };
+        Self { entries: Arc::new(entries), approximate: false }
+    }
+
+    /// The same values, with masses and contact samples that are approximate: for scenes that are checked, and at most
+    /// settle.
+    #[must_use]
+    pub fn approximate(&self) -> Self {
+        Self { approximate: true, ..self.clone() }
+    }
+
+    /// The same values, with exact masses and contact samples.
+    #[must_use]
+    pub fn exact(&self) -> Self {
+        Self { approximate: false, ..self.clone() }
+    }
+
+    /// Tight bounds of a shape.
+    pub fn bounds(&self, shape: &Shape) -> Aabb {
+        shape.closed_bounds().unwrap_or_else(|| self.shape(shape).bounds())
+    }
+
+    /// What is derived from a shape.
+    pub(super) fn shape(&self, shape: &Shape) -> Arc<DerivedShape> {
+        let CacheEntries { shapes, disk, .. } = &*self.entries;
+        let new = || Ok::<_, Infallible>(Arc::new(DerivedShape::new(shape, disk)));
+        let Ok(derived) = shapes.get(shape, |known| known == shape, new);
+        derived
+    }
+
+    /// Mass properties of a shape at a uniform density, kg/m³.
+    pub(super) fn mass(&self, shape: &Shape, density: f64) -> MassProperties {
+        let derived = self.shape(shape);
+        let unit = derived.unit_mass(self.approximate);
+        MassProperties { mass: unit.mass * density, com: unit.com, inertia: unit.inertia * density }
     }
 
     /// Finite-element model of a soft object with this material. Instances of one asset share its discretisation.
@@ -155,19 +270,79 @@ impl AssetCache {
             Body::Soft(declared) => declared,
             _ => material,
         };
+        let (CacheEntries { geometries, models, disk, .. }, approximate) = (&*self.entries, self.approximate);
         let build = || {
-            let geometry = self.geometries.get(
-                nominal,
-                |known| known.shape == nominal.shape && has_discretisation(known, declared),
+            let geometry = geometries.get(
+                &(nominal.clone(), approximate),
+                |(known, rough)| {
+                    *rough == approximate
+                        && known.shape == nominal.shape
+                        && has_discretisation(known, declared)
+                },
                 || {
-                    SoftGeometry::stored(&asset.name, &nominal.shape, declared, self.approximate, &self.disk)
+                    SoftGeometry::stored(&asset.name, &nominal.shape, declared, approximate, disk)
                         .map(Arc::new)
                 },
             )?;
             Ok(geometry.model(material, object.scale))
         };
-        self.models.get(asset, |known| known.shape == asset.shape && known.body == asset.body, build)
+        let is_same =
+            |(known, rough): &(Arc<Asset>, bool)| *rough == approximate && have_same_surface(known, asset);
+        models.get(&(asset.clone(), approximate), is_same, build)
     }
+
+    /// Render mesh of an asset; `mesh` is the voxel mesh of a soft body.
+    pub(super) fn mesh(
+        &self,
+        name: &str,
+        asset: &Arc<Asset>,
+        mesh: Option<&VoxelMesh>,
+    ) -> Result<Arc<RenderMesh>, CameraError> {
+        let same = |known: &Arc<Asset>| have_same_surface(known, asset) && known.visuals == asset.visuals;
+        self.entries.meshes.get(asset, same, || {
+            let (shape, visuals, disk) = (&asset.shape, &asset.visuals, &self.entries.disk);
+            let model = match mesh {
+                None => RenderMesh::from_shape(name, shape, visuals, disk)?,
+                Some(mesh) => RenderMesh::from_soft_shape(name, shape, visuals, mesh, disk)?,
+            };
+            Ok(Arc::new(model))
+        })
+    }
+
+    /// Tactile skin of an asset: the fine surface mesh that presses into gels.
+    pub(super) fn skin(
+        &self,
+        name: &str,
+        asset: &Arc<Asset>,
+        mesh: Option<&VoxelMesh>,
+    ) -> Result<Arc<TactileSkin>, SensingError> {
+        let same = |known: &Arc<Asset>| have_same_surface(known, asset);
+        self.entries.skins.get(asset, same, || {
+            let disk = &self.entries.disk;
+            let skin = match mesh {
+                None => TactileSkin::from_shape(&asset.shape, disk),
+                Some(mesh) => TactileSkin::from_soft(&asset.shape, mesh, disk)
+                    .ok_or_else(|| SensingError::Skin(name.to_owned()))?,
+            };
+            Ok(Arc::new(skin))
+        })
+    }
+
+    /// Render meshes of the robot.
+    pub(super) fn robot(&self) -> Result<Arc<RobotMeshes>, CameraError> {
+        let CacheEntries { robot, disk, .. } = &*self.entries;
+        robot.get(&(), |()| true, || Ok(Arc::new(RobotMeshes::new(disk)?)))
+    }
+
+    /// Tactile sensor of a specification.
+    pub(super) fn sensor(&self, spec: &TactileSpec) -> Result<Arc<TactileSensor>, SensingError> {
+        self.entries.sensors.get(spec, |known| known == spec, || Ok(Arc::new(TactileSensor::new(spec)?)))
+    }
+}
+
+/// True if two assets have the same surface, at rest and deformed.
+fn have_same_surface(a: &Asset, b: &Asset) -> bool {
+    a.shape == b.shape && a.body == b.body
 }
 
 /// True if an asset is a soft body with the resolution and the contact samples of `material`.

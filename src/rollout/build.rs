@@ -37,7 +37,7 @@ fn check_scale(object: &Object, cache: &AssetCache) -> Result<(), SceneBuildErro
 }
 
 /// The error about walls that are too thin for a minimum (m); `description` states how thick they are.
-fn thin_walls(object: &Object, description: &str, min: f64) -> SceneBuildError {
+fn thin_walls_error(object: &Object, description: &str, min: f64) -> SceneBuildError {
     let min = format_number(1e3 * min);
     let what =
         format!("{description}, expected at least {min} mm: other bodies may pass through thinner ones");
@@ -151,13 +151,13 @@ fn add(
     check_scale(object, cache)?;
     check_friction(asset)?;
     if matches!(asset.body, Body::Rigid { .. })
-        && let Some(wall) = cache.wall(&asset.shape).filter(|wall| *wall < MIN_WALL)
+        && let Some(wall) = cache.shape(&asset.shape).wall().filter(|wall| *wall < MIN_WALL)
     {
         let description = format!("it is about {} mm thick, or its walls are", tenths_of_mm(wall));
-        return Err(thin_walls(object, &description, MIN_WALL));
+        return Err(thin_walls_error(object, &description, MIN_WALL));
     }
     let collider = |world: &World, parent: BodyId, pose_in_parent| {
-        cache.collider(world, &object.name, parent, pose_in_parent, &asset.shape, asset.friction)
+        cache.shape(&asset.shape).collider(world, &object.name, parent, pose_in_parent, asset.friction)
     };
     let (mut parts, mut fem_model) = (Vec::new(), None);
     let (body, colliders) = match &asset.body {
@@ -169,7 +169,7 @@ fn add(
                 return Err(SceneBuildError::Nodes(nodes));
             }
             fem_model = Some(model.clone());
-            let surface: Arc<dyn ContactSurface> = Arc::new(asset.shape.clone());
+            let surface: Arc<dyn ContactSurface> = cache.shape(&asset.shape);
             let id = world.add_soft(&object.name, model, Some(surface), &object.pose_w, asset.friction);
             (id.into(), Vec::new())
         }
@@ -217,10 +217,10 @@ fn add_articulated(
     cache: &AssetCache,
 ) -> Result<(ArticulationId, Vec<ObjectInstance>), SceneBuildError> {
     for part in parts {
-        if let Some(wall) = cache.wall(&part.asset.shape) {
+        if let Some(wall) = cache.shape(&part.asset.shape).wall() {
             let mm = tenths_of_mm(wall);
             let description = format!("part {}: its walls are about {mm} mm thick", part.name);
-            return Err(thin_walls(object, &description, MIN_PART_WALL));
+            return Err(thin_walls_error(object, &description, MIN_PART_WALL));
         }
     }
     let links = parts.iter().map(|part| link(part, parts, cache)).collect();
@@ -232,8 +232,8 @@ fn add_articulated(
         let name = format!("{}.{}", object.name, part.name);
         let link = LinkId { articulation, index };
         let pose_in_link = Pose::from(-part.joint.origin_o);
-        let (shape, friction) = (&part.asset.shape, part.asset.friction);
-        let collider = cache.collider(world, &name, link.into(), pose_in_link, shape, friction);
+        let shape = cache.shape(&part.asset.shape);
+        let collider = shape.collider(world, &name, link.into(), pose_in_link, part.asset.friction);
         ObjectInstance {
             name,
             asset: part.asset.clone(),

@@ -15,9 +15,8 @@ use super::{
     metric::{MeasuredMetric, MetricValues},
     observation_history::ObservationHistory,
     robot_instance::ArmCommand,
-    sensor_assets::{SensingError, SensorAssets},
     sensor_noise::SensorSeed,
-    sensors::{Sensors, StateDeformation, StateRecording, check_sensors},
+    sensors::{SensingError, Sensors, StateDeformation, StateRecording, check_sensors},
     simulation::{Simulation, placed_at, state_hash},
     trace::StepTrace,
 };
@@ -214,12 +213,8 @@ impl Episode {
     ///
     /// # Errors
     /// The sensors or objects of the scene are invalid, it does not come to rest, or the goal names an unknown object.
-    pub fn start(
-        spec: EpisodeSpec,
-        cache: &AssetCache,
-        sensor_assets: &SensorAssets,
-    ) -> Result<Self, EpisodeError> {
-        check_sensors(&spec.scene, &spec.settings.tactile, sensor_assets)
+    pub fn start(spec: EpisodeSpec, cache: &AssetCache) -> Result<Self, EpisodeError> {
+        check_sensors(&spec.scene, &spec.settings.tactile, cache)
             .map_err(|source| spec.sense_error(source))?;
         let mut sim =
             Simulation::new(spec.scene.clone(), &spec.settings.physics, &spec.settings.robot, cache)?;
@@ -250,8 +245,7 @@ impl Episode {
         let start_hold = Action::new(tool.translation.vector, rotation::axis_angle(&tool.rotation), 0.0);
         let seed = EpisodeSeed::new(&spec.header.id, &spec.task.layout).with_secret(spec.secret.as_ref());
         let disturbance = Disturbance::new(&spec.settings.robot.disturbance, &seed);
-        let sensors =
-            Sensors::new(&sim, &spec.settings.tactile, sensor_assets).with_seed(SensorSeed::new(&seed));
+        let sensors = Sensors::new(&sim, &spec.settings.tactile, cache).with_seed(SensorSeed::new(&seed));
         let recorded = spec.record_states.then(Vec::new);
         let metric_values = vec![MetricValues::default(); spec.metrics.len()];
         Ok(Self {

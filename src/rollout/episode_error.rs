@@ -1,6 +1,6 @@
 //! Errors of an episode.
 
-use super::{build_error::SceneBuildError, sensor_assets::SensingError, simulation::SettleError};
+use super::{build_error::SceneBuildError, sensors::SensingError, simulation::SettleError};
 use softvt_benchmark::Goal;
 use softvt_common::text::format_number;
 use softvt_geometry::Vec3;

@@ -10,7 +10,7 @@ use super::{
 };
 use softvt_benchmark::{
     Placement, Task,
-    goal::{Goal, Parts, Side},
+    goal::{Goal, Side, SubGoals},
 };
 use softvt_evaluation::{
     goal::GoalRegion,
@@ -215,7 +215,7 @@ impl Finder<'_> {
         })
     }
 
-    fn nodes(&mut self, parts: &Parts) -> Result<Vec<GoalNode>, EpisodeError> {
+    fn nodes(&mut self, parts: &SubGoals) -> Result<Vec<GoalNode>, EpisodeError> {
         parts.goals.iter().map(|goal| self.node(goal)).collect()
     }
 
@@ -380,7 +380,7 @@ fn region_of(target: &ObjectInstance, is_inside: bool, cache: &AssetCache) -> Op
     if !is_inside {
         return Some(GoalRegion::On { radius_m: 0.5 * target.bounds.size().xy().min() });
     }
-    let Aabb { min, max } = cache.cavity(&target.asset.shape)?;
+    let Aabb { min, max } = cache.shape(&target.asset.shape).cavity()?;
     let foot = target.foot_o();
     Some(GoalRegion::Inside { space: Aabb { min: min - foot, max: max - foot } })
 }

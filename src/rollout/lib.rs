@@ -1,7 +1,7 @@
 //! Execution of episodes: building and settling a scene, observing, acting, stepping and judging.
 //!
 //! `build` turns a scene into a [`Simulation`]; an [`Episode`] runs it with a [`Controller`] and returns the record.
-//! Data derived from assets are shared between episodes in [`AssetCache`] and [`SensorAssets`].
+//! Data derived from assets are shared between episodes in [`AssetCache`].
 //!
 //! # Example
 //!
@@ -17,7 +17,7 @@
 //! use softvt_geometry::{Aabb, Pose, Vec3, shape::Shape};
 //! use softvt_physics::contact::Friction;
 //! use softvt_policy::{EpisodeBrief, builtin::NoopPolicy};
-//! use softvt_rollout::{AssetCache, ChunkedPolicy, Episode, EpisodeSpec, SensorAssets};
+//! use softvt_rollout::{AssetCache, ChunkedPolicy, Episode, EpisodeSpec};
 //! use softvt_scene::{Asset, Body, Lighting, Object, Scene};
 //!
 //! // A cube of 4 cm and a slab rest on a table top of 5 cm, whose upper side is at z = 0.
@@ -60,7 +60,7 @@
 //! let suite = "example".to_owned();
 //! let id = EpisodeId { suite: suite.clone(), task: 0, episode: 0, base_seed: 0, split: EpisodeSplit::Validation };
 //! let spec = EpisodeSpec::new(id, "noop", &task, &scene.clone(), scene, &Settings::default());
-//! let episode = Episode::start(spec, &AssetCache::default(), &SensorAssets::default())?;
+//! let episode = Episode::start(spec, &AssetCache::default())?;
 //!
 //! let brief = EpisodeBrief { suite, task: 0, prompt: task.prompt.clone(), episode: 0, seed: 0, alias: None };
 //! let finished = episode.run(&mut ChunkedPolicy::new(Box::<NoopPolicy>::default(), brief, 1))?;
@@ -80,12 +80,10 @@ mod episode;
 mod episode_error;
 mod evidence;
 mod goal_in_scene;
-mod joint_warnings;
 mod metric;
 mod observation_history;
+mod plausibility;
 mod robot_instance;
-mod scene_warnings;
-mod sensor_assets;
 mod sensor_noise;
 mod sensors;
 mod settled_box;
@@ -102,12 +100,11 @@ pub use episode::{Episode, EpisodeSpec, FinishedEpisode, target_asset};
 pub use episode_error::EpisodeError;
 pub use goal_in_scene::{GoalAtStart, StatePredicate, check_goal};
 pub use metric::{MeasuredMetric, StateFunction};
+pub use plausibility::{asset_warnings, friction_warnings, scene_warnings};
 pub use robot_instance::{ArmCommand, RobotInstance};
-pub use scene_warnings::scene_warnings;
-pub use sensor_assets::{SensingError, SensorAssets};
 pub use sensor_noise::SensorSeed;
 pub use sensors::{
-    BodyConfiguration, CAMERA_IMAGE_SUFFIXES, CloseUp, Sensors, StateDeformation, StateRecording,
+    BodyConfiguration, CAMERA_IMAGE_SUFFIXES, CloseUp, SensingError, Sensors, StateDeformation, StateRecording,
     TACTILE_IMAGE_SUFFIXES, TACTILE_IMAGES, check_sensors, strain_colour,
 };
 pub use settled_box::SettledBox;

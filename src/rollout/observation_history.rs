@@ -2,7 +2,7 @@
 
 use std::{collections::VecDeque, sync::Arc};
 
-use super::{sensor_assets::SensingError, sensors::Sensors};
+use super::sensors::{SensingError, Sensors};
 use softvt_physics::world::WorldSnapshot;
 use softvt_policy::{
     CameraImage, Observation, PastStep, RobotState, SensorStreams, TactileFrame, TactileHistory,

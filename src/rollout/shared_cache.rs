@@ -7,44 +7,26 @@ use std::sync::{Arc, Mutex};
 
 use softvt_common::parallel::lock;
 
-/// Maximum number of entries, unless stated. A suite has a few dozen assets, but a layout with random appearance adds
-/// new ones of several megabytes in every episode.
-const MAX_ENTRIES: usize = 64;
-
 /// The slot of a value: empty until the value is computed.
 type CacheSlot<V> = Arc<Mutex<Option<V>>>;
 
 /// Slots by key, the most recently used last.
 type Entries<K, V> = Vec<(K, CacheSlot<V>)>;
 
-/// Values by key. Least recently used entries are evicted. A clone shares the entries.
+/// Values by key. Least recently used entries are evicted.
 #[derive(Debug)]
 pub(super) struct SharedCache<K, V> {
-    entries: Arc<Mutex<Entries<K, V>>>,
+    entries: Mutex<Entries<K, V>>,
     /// Maximum number of entries.
     most: usize,
 }
 
-impl<K, V> Clone for SharedCache<K, V> {
-    fn clone(&self) -> Self {
-        Self { entries: self.entries.clone(), most: self.most }
-    }
-}
-
-impl<K, V> Default for SharedCache<K, V> {
-    fn default() -> Self {
-        Self::of_size(MAX_ENTRIES)
-    }
-}
-
-impl<K, V> SharedCache<K, V> {
-    /// A cache of at most `most` entries.
-    pub(super) fn of_size(most: usize) -> Self {
-        Self { entries: Arc::default(), most }
-    }
-}
-
 impl<K: Clone, V: Clone> SharedCache<K, V> {
+    /// A cache of at most `most` entries.
+    pub(super) fn new(most: usize) -> Self {
+        Self { entries: Mutex::new(Vec::new()), most }
+    }
+
     /// Returns the value whose key satisfies `is_same`, or computes and stores the value of `key`. Concurrent callers
     /// with an equal key block until the first has computed it (single flight); callers with other keys proceed.
     ///
@@ -94,6 +76,8 @@ mod tests {
 
     use super::*;
 
+    const MOST: usize = 64;
+
     fn double(cache: &SharedCache<usize, usize>, key: usize, count: &AtomicUsize) -> usize {
         let value: Result<_, Infallible> = cache.get(
             &key,
@@ -108,20 +92,20 @@ mod tests {
 
     #[test]
     fn recently_used_values_are_kept_up_to_the_limit() {
-        let (cache, count) = (SharedCache::default(), AtomicUsize::new(0));
-        for key in 0..10 * MAX_ENTRIES {
+        let (cache, count) = (SharedCache::new(MOST), AtomicUsize::new(0));
+        for key in 0..10 * MOST {
             assert_eq!(double(&cache, key, &count), 2 * key);
             assert_eq!(double(&cache, 0, &count), 0, "in use all the time");
         }
-        assert_eq!(count.load(Ordering::Relaxed), 10 * MAX_ENTRIES);
-        assert_eq!(lock(&cache.entries).len(), MAX_ENTRIES);
+        assert_eq!(count.load(Ordering::Relaxed), 10 * MOST);
+        assert_eq!(lock(&cache.entries).len(), MOST);
         double(&cache, 1, &count);
-        assert_eq!(count.load(Ordering::Relaxed), 10 * MAX_ENTRIES + 1, "an evicted value is computed again");
+        assert_eq!(count.load(Ordering::Relaxed), 10 * MOST + 1, "an evicted value is computed again");
     }
 
     #[test]
     fn other_values_are_computed_meanwhile_and_an_equal_key_waits() {
-        let (cache, count) = (SharedCache::<usize, usize>::default(), AtomicUsize::new(0));
+        let (cache, count) = (SharedCache::<usize, usize>::new(MOST), AtomicUsize::new(0));
         let (started, begun) = mpsc::channel();
         let (go, wait) = mpsc::channel::<()>();
         std::thread::scope(|scope| {
@@ -147,7 +131,7 @@ mod tests {
 
     #[test]
     fn a_failed_computation_is_repeated() {
-        let cache = SharedCache::<(), u8>::default();
+        let cache = SharedCache::<(), u8>::new(1);
         assert_eq!(cache.get(&(), |()| true, || Err("no")), Err("no"));
         assert_eq!(cache.get(&(), |()| true, || Ok::<_, &str>(3)), Ok(3));
     }

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use cpu_time::ThreadTime;
 
 use super::{
-    bench_rates::{Caches, all_streams, fastest, first_episode, observations_per_s, suite_of, time_episode},
+    bench_rates::{all_streams, fastest, first_episode, observations_per_s, suite_of, time_episode},
     config::RunConfig,
     error::RunError,
 };
@@ -17,7 +17,7 @@ use softvt_media::{
     plot::PlotPoint,
 };
 use softvt_physics::{KinematicId, PhysicsParams, World, contact::Friction, fem::ElasticMaterial};
-use softvt_rollout::{SensorAssets, Sensors, Simulation, soft_model};
+use softvt_rollout::{AssetCache, Sensors, Simulation, soft_model};
 use softvt_scene::SoftMaterial;
 use softvt_script::{EpisodeSetup, LoadedScript, SceneChanges};
 
@@ -93,12 +93,12 @@ pub fn measure(
     let bodies = |&count: &usize| Ok(GrowthPoint { size: count as f64, cost: squeeze(count, RESOLUTION)? });
     let bodies = COUNTS.iter().map(bodies).collect::<Result<_, RunError>>()?;
     on_stage("threads");
-    let caches = Caches::default();
-    time_episode(&loaded, &all_streams(), &caches)?;
+    let assets = AssetCache::default();
+    time_episode(&loaded, &all_streams(), &assets)?;
     let mut of_threads = Vec::new();
     for count in std::iter::successors(Some(1), |count| Some(2 * count)).take_while(|count| *count <= threads)
     {
-        let cost = fastest(|| observations_per_s(&loaded, count, &caches))?;
+        let cost = fastest(|| observations_per_s(&loaded, count, &assets))?;
         of_threads.push(GrowthPoint { size: count as f64, cost });
     }
     on_stage("pixels");
@@ -164,11 +164,11 @@ fn draw(loaded: &LoadedScript) -> Result<Vec<GrowthPoint>, RunError> {
         .map_err(RunError::input)?;
     let settings = &suite.settings;
     let scene = Arc::new(opened.scene);
-    let caches = Caches::default();
-    let mut sim = Simulation::new(scene, &settings.physics, &settings.robot, &caches.assets)
-        .map_err(RunError::input)?;
+    let assets = AssetCache::default();
+    let mut sim =
+        Simulation::new(scene, &settings.physics, &settings.robot, &assets).map_err(RunError::input)?;
     sim.settle().map_err(RunError::input)?;
-    let mut sensors = Sensors::new(&sim, &settings.tactile, &SensorAssets::default());
+    let mut sensors = Sensors::new(&sim, &settings.tactile, &assets);
     let (frame, camera) =
         (Sensors::frame(&sim), sensors.camera("third_person").map_err(RunError::input)?.clone());
     let mut points = Vec::new();

@@ -18,7 +18,7 @@ use softvt_common::{
     text::{TextTable, decimal},
 };
 use softvt_policy::{Action, Observation, PolicyError, SensorStreams};
-use softvt_rollout::{AssetCache, Controller, Episode, EpisodeSpec, SensorAssets, Simulation};
+use softvt_rollout::{AssetCache, Controller, Episode, EpisodeSpec, Simulation};
 use softvt_scene::STANDARD_CAMERAS;
 use softvt_script::{EpisodeSetup, ExpertController, ExpertGrip, LoadedScript, SceneChanges};
 
@@ -114,23 +114,23 @@ pub fn measure(
 ) -> Result<MachineRates, RunError> {
     let loaded = RunConfig::of(script).load()?.script;
     on_stage("the first observation");
-    let first = time_episode(&loaded, &all_streams(), &Caches::without_disk())?;
+    let first = time_episode(&loaded, &all_streams(), &AssetCache::stored_in(DiskCache::DISABLED))?;
     // The first time fills the cache on disk.
-    time_episode(&loaded, &all_streams(), &Caches::default())?;
-    let caches = Caches::default();
-    let cached = time_episode(&loaded, &all_streams(), &caches)?;
+    time_episode(&loaded, &all_streams(), &AssetCache::default())?;
+    let assets = AssetCache::default();
+    let cached = time_episode(&loaded, &all_streams(), &assets)?;
     let has_cache = DiskCache::default().is_in_use();
     let mut streams = Vec::new();
     for (index, name) in STREAMS.into_iter().enumerate() {
         on_stage(name);
         let rate = || {
-            let timing = time_episode(&loaded, &streams_of(index), &caches)?;
+            let timing = time_episode(&loaded, &streams_of(index), &assets)?;
             Ok(timing.steps / timing.cpu_s)
         };
         streams.push(StreamRate { streams: name.to_owned(), observations_per_s: fastest(rate)? });
     }
     on_stage("all threads");
-    let observations_per_s = fastest(|| observations_per_s(&loaded, threads, &caches))?;
+    let observations_per_s = fastest(|| observations_per_s(&loaded, threads, &assets))?;
     Ok(MachineRates {
         softvt: env!("CARGO_PKG_VERSION").to_owned(),
         script: script.to_owned(),
@@ -152,10 +152,10 @@ pub(crate) fn fastest(mut rate: impl FnMut() -> Result<f64, RunError>) -> Result
 pub(crate) fn observations_per_s(
     loaded: &LoadedScript,
     threads: usize,
-    caches: &Caches,
+    assets: &AssetCache,
 ) -> Result<f64, RunError> {
     let mut rate = 0.0;
-    let run = |_| time_episode(loaded, &all_streams(), caches);
+    let run = |_| time_episode(loaded, &all_streams(), assets);
     parallel::run(threads, threads, cancel::requested, run, |_, timing| {
         rate += timing.steps / timing.wall_s;
         Ok(())
@@ -176,23 +176,6 @@ fn streams_of(row: usize) -> SensorStreams {
         1 => SensorStreams { cameras, ..SensorStreams::default() },
         2 => SensorStreams { tactile: true, ..SensorStreams::default() },
         _ => SensorStreams { cameras, tactile: true, force: true, ..SensorStreams::default() },
-    }
-}
-
-/// Caches shared by all episodes.
-#[derive(Default)]
-pub(crate) struct Caches {
-    pub(crate) assets: AssetCache,
-    sensors: SensorAssets,
-}
-
-impl Caches {
-    /// Caches that keep nothing on disk.
-    fn without_disk() -> Self {
-        Self {
-            assets: AssetCache::stored_in(DiskCache::DISABLED),
-            sensors: SensorAssets::stored_in(DiskCache::DISABLED),
-        }
     }
 }
 
@@ -235,7 +218,7 @@ impl Controller for ObservedExpert {
 pub(crate) fn time_episode(
     loaded: &LoadedScript,
     streams: &SensorStreams,
-    caches: &Caches,
+    assets: &AssetCache,
 ) -> Result<EpisodeTiming, RunError> {
     let begin = ThreadTime::now();
     let suite = suite_of(loaded)?;
@@ -247,7 +230,7 @@ pub(crate) fn time_episode(
     let expert =
         opened.expert(ExpertGrip::Commanded).ok_or_else(|| RunError::input("the suite has no expert"))?;
     let mut controller = ObservedExpert { expert, streams: streams.clone(), first_action: None };
-    let episode = Episode::start(spec, &caches.assets, &caches.sensors).map_err(RunError::input)?;
+    let episode = Episode::start(spec, assets).map_err(RunError::input)?;
     let record = episode.run(&mut controller).map_err(RunError::input)?.record;
     let first = controller.first_action.ok_or_else(|| RunError::input("the expert never acted"))?;
     let cpu_s = first.cpu.elapsed().as_secs_f64();

@@ -18,7 +18,6 @@ pub mod episode_selector;
 mod error;
 mod evaluate;
 pub mod experiment;
-mod friction;
 mod golden_episode;
 pub mod import;
 mod limits;

@@ -70,9 +70,8 @@ impl CalibrationFile {
 pub(crate) struct SceneLimits {
     /// By name of the object in the scene.
     pub by_object: BTreeMap<String, DeformationLimit>,
-    /// Names of the assets of all soft objects, and of those of them that have a limit.
+    /// Names of the assets of all soft objects.
     assets: BTreeSet<String>,
-    judged: BTreeSet<String>,
     /// One message per object without a limit.
     missing: Vec<String>,
 }
@@ -102,10 +101,7 @@ impl CalibrationFiles {
         for object in scene.objects.iter().filter(|object| matches!(object.asset.body, Body::Soft(_))) {
             found.assets.insert(object.nominal.name.clone());
             match self.limit_of(object, targets.contains(&object.name.as_str()))? {
-                Ok(limit) => {
-                    found.by_object.insert(object.name.clone(), limit);
-                    found.judged.insert(object.nominal.name.clone());
-                }
+                Ok(limit) => drop(found.by_object.insert(object.name.clone(), limit)),
                 Err(message) => found.missing.push(message),
             }
         }
@@ -203,7 +199,6 @@ fn relative_path(asset: &str) -> String {
 pub(crate) struct LimitScan {
     scenes: usize,
     assets: BTreeSet<String>,
-    judged: BTreeSet<String>,
     /// Messages about missing limits, with the scenes concerned.
     missing: BTreeMap<String, Vec<EpisodeIndex>>,
 }
@@ -212,7 +207,6 @@ impl LimitScan {
     pub(crate) fn add(&mut self, index: EpisodeIndex, limits: SceneLimits) {
         self.scenes += 1;
         self.assets.extend(limits.assets);
-        self.judged.extend(limits.judged);
         for message in limits.missing.into_iter().collect::<BTreeSet<_>>() {
             self.missing.entry(message).or_default().push(index);
         }
@@ -234,7 +228,7 @@ impl LimitScan {
 
     /// The calibrations of the assets that were found.
     pub(crate) fn calibrations(&self, files: &CalibrationFiles) -> Calibrations {
-        let mut found = Calibrations { judged: self.judged.clone(), ..Calibrations::default() };
+        let mut found = Calibrations::default();
         let read = lock(&files.read);
         for asset in &self.assets {
             let file = read.get(asset).and_then(Option::as_ref);
@@ -252,8 +246,6 @@ impl LimitScan {
 /// Calibrations of the assets of a run.
 #[derive(Clone, Debug)]
 pub(crate) struct Calibrations {
-    /// Soft assets whose objects have a limit, which also fits their version.
-    pub judged: BTreeSet<String>,
     /// τ by asset, %; `None` without a calibration.
     pub tau_pct: BTreeMap<String, Option<f64>>,
     /// SHA-256 of the calibration files, by path below a project folder.
@@ -266,7 +258,7 @@ impl Default for Calibrations {
     fn default() -> Self {
         let generated_by = format!("softvt {}", env!("CARGO_PKG_VERSION"));
         let merged = ThresholdFile::new(NOMINAL_KAPPA, Vec::new(), generated_by);
-        Self { judged: BTreeSet::new(), tau_pct: BTreeMap::new(), sources: BTreeMap::new(), merged }
+        Self { tau_pct: BTreeMap::new(), sources: BTreeMap::new(), merged }
     }
 }
 

@@ -12,7 +12,6 @@ use crate::{
     episode_artifacts::EpisodeArtifacts,
     episode_list::{EpisodeJob, EpisodeList},
     error::{RunError, RunErrorCause},
-    friction::friction_warnings,
     limits::{CalibrationFiles, Calibrations, LimitScan, SceneLimits},
     policy::{ControllerFactory, DeclaredStreams, PolicyConfig},
     recorded_runs::RecordedRuns,
@@ -24,8 +23,8 @@ use softvt_common::episode_id::{EpisodeId, EpisodeIndex, EpisodeSplit};
 use softvt_common::{parallel, text::unknown_name};
 use softvt_policy::{EpisodeBrief, PolicyError, SensorStreams, remote::PolicyConnections};
 use softvt_rollout::{
-    AssetCache, Episode, EpisodeError, EpisodeSpec, FinishedEpisode, SceneBuildError, SensorAssets, Sensors,
-    Simulation, StatePredicate, check_goal, check_sensors, cost_warning,
+    AssetCache, Episode, EpisodeError, EpisodeSpec, FinishedEpisode, SceneBuildError, Sensors, Simulation,
+    StatePredicate, check_goal, check_sensors, cost_warning, friction_warnings,
 };
 use softvt_runs::{
     manifest::{ImportedFile, ReplaySource},
@@ -64,10 +63,8 @@ pub struct SuiteRun<'a> {
     pub(crate) reads_limits: bool,
     /// The recorded run whose actions are repeated.
     pub(crate) replay_source: Option<ReplaySource>,
-    /// Meshes of the objects, shared by all episodes.
+    /// Data derived from the objects, shared by all episodes.
     pub(crate) assets: AssetCache,
-    /// Data of cameras and tactile sensors, shared by all episodes.
-    pub(crate) sensor_assets: SensorAssets,
     /// Folder of the run.
     pub out: PathBuf,
     /// True if any episode may be rendered.
@@ -153,8 +150,7 @@ impl<'a> SuiteRun<'a> {
             )),
             reads_limits: true,
             replay_source,
-            assets: AssetCache::default(),
-            sensor_assets: SensorAssets::default(),
+            assets: loaded.sources.assets.clone(),
             out,
             renders_episodes: config.video.is_some() || config.mcap.is_some(),
             records_trace: config.trace.is_some(),
@@ -350,7 +346,7 @@ impl<'a> SuiteRun<'a> {
         let brief = EpisodeBrief { prompt: opened.prompt.clone(), ..self.brief(job.task, job.episode) };
         let mut controller = controllers(opened, brief)?;
         let spec = EpisodeSpec { record_states: keep_states, ..spec };
-        let started = Episode::start(spec, &self.assets, &self.sensor_assets);
+        let started = Episode::start(spec, &self.assets);
         Ok(started.and_then(|started| started.run_watched(&mut *controller, watch)))
     }
 
@@ -373,7 +369,7 @@ impl<'a> SuiteRun<'a> {
     /// The script or the scene fails.
     pub fn start_episode(&self, task: &Task, id: &EpisodeId) -> Result<Episode, RunError> {
         let (spec, _) = self.spec(task, id, None)?;
-        Episode::start(spec, &self.assets, &self.sensor_assets).map_err(|e| self.episode_error(&e))
+        Episode::start(spec, &self.assets).map_err(|e| self.episode_error(&e))
     }
 
     /// The specification of an episode, and the script's episode for the controller.
@@ -480,7 +476,9 @@ impl<'a> SuiteRun<'a> {
             let first = self.jobs.episodes_of(task.id).next().unwrap_or(0);
             let opened = self.open_episode(&self.episode_id(task, first))?;
             has_changed |= opened.is_shifted();
-            warnings.extend(friction_warnings(self, task, &opened));
+            if self.suite.vary.is_some() || !self.config.shifts.is_empty() {
+                warnings.extend(self.friction_warnings(&opened));
+            }
             self.check_object_type(task, &opened.nominal)?;
             let scene = Arc::new(opened.scene.clone());
             self.check_declared_cameras(&scene, task)?;
@@ -503,6 +501,12 @@ impl<'a> SuiteRun<'a> {
             self.config.notice(format!("warning: {warning}"));
         }
         Ok(force_observed)
+    }
+
+    /// Warnings about friction that the episode sets without effect.
+    pub(crate) fn friction_warnings(&self, opened: &EpisodeSetup) -> Vec<String> {
+        let variation = self.suite.vary.as_ref().zip(opened.variation.as_ref());
+        friction_warnings(&opened.scene, variation, self.settings.robot.pads.static_mu)
     }
 
     /// Refuses shifts that change neither the scene nor the prompt of any task, unless their values are the nominal
@@ -540,7 +544,7 @@ impl<'a> SuiteRun<'a> {
         let settings = &self.settings;
         let sense = |source| EpisodeError::Sense { task: task.id, episode, source };
         let check = || -> Result<Vec<String>, EpisodeError> {
-            check_sensors(&scene, &settings.tactile, &self.sensor_assets).map_err(sense)?;
+            check_sensors(&scene, &settings.tactile, &self.assets).map_err(sense)?;
             let sim = Simulation::new(scene.clone(), &settings.physics, &settings.robot, &self.assets)?;
             sim.check_support()?;
             let goal = check_goal(task, &sim, &self.assets, &predicates)?;
@@ -550,9 +554,9 @@ impl<'a> SuiteRun<'a> {
                 let id = self.episode_id(task, episode);
                 let spec = EpisodeSpec::new(id, "noop", task, &scene, Scene::clone(&scene), settings);
                 let spec = EpisodeSpec { predicates: predicates.clone(), ..spec };
-                Episode::start(spec, &AssetCache::default(), &self.sensor_assets)?;
+                Episode::start(spec, &self.assets.exact())?;
             }
-            let mut sensors = Sensors::new(&sim, &settings.tactile, &self.sensor_assets);
+            let mut sensors = Sensors::new(&sim, &settings.tactile, &self.assets);
             sensors.check_camera_positions(&Sensors::frame(&sim)).map_err(sense)?;
             let held_step = goal.held_step.map(|step| {
                 format!(
@@ -632,7 +636,7 @@ impl<'a> SuiteRun<'a> {
     ) -> Result<(), EpisodeError> {
         let settings = &self.settings;
         let sense = |source| EpisodeError::Sense { task: task.id, episode, source };
-        check_sensors(&scene, &settings.tactile, &self.sensor_assets).map_err(sense)?;
+        check_sensors(&scene, &settings.tactile, &self.assets).map_err(sense)?;
         if self.renders_episodes {
             streams.tactile = true;
             streams.cameras.extend(scene.cameras.iter().map(|camera| camera.name.clone()));
@@ -641,7 +645,7 @@ impl<'a> SuiteRun<'a> {
             return Ok(());
         }
         let sim = Simulation::new(scene, &settings.physics, &settings.robot, &self.assets)?;
-        let mut sensors = Sensors::new(&sim, &settings.tactile, &self.sensor_assets);
+        let mut sensors = Sensors::new(&sim, &settings.tactile, &self.assets);
         sensors.validate(&Sensors::frame(&sim), &streams).map_err(sense)
     }
 }

@@ -66,7 +66,7 @@ fn of_run(
         let (physics, robot) = (&scenes.settings.physics, &scenes.settings.robot);
         let sim = Simulation::new(scene, physics, robot, &scenes.assets).map_err(RunError::input)?;
         let Some(target) = sim.objects.iter().position(|object| object.name == task.object) else { continue };
-        let mut sensors = Sensors::new(&sim, &scenes.settings.tactile, &scenes.sensor_assets);
+        let mut sensors = Sensors::new(&sim, &scenes.settings.tactile, &scenes.assets);
         let picture = sensors.portrait(&Sensors::frame(&sim), target, EDGE).map_err(RunError::input)?;
         pictures.insert((*asset).to_owned(), picture);
     }

@@ -77,7 +77,7 @@ impl SoftMaterial {
     /// Range of the spacing of contact samples, m.
     pub const GRASP_SPACING_M: Range = Range::closed(1e-4, 0.02);
     /// Range of the strains at which the material changes.
-    pub const STRAIN: Range = Range::above(0.0, 1.0);
+    pub const STRAIN: Range = Range::above(0.0, 1.0).usually(0.002, 0.8);
 
     /// Strain up to which the material is stable and undamaged: the smaller of its two limits.
     pub fn stable_strain(&self) -> Option<f64> {

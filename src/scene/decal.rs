@@ -66,13 +66,6 @@ impl TextDecal {
         Self { line, coverage: OnceLock::new() }
     }
 
-    /// Upper bound of the memory of the raster, bytes.
-    pub fn bytes(&self) -> usize {
-        // A letter is at most two capitals wide and high.
-        let texels = (2.0 * CAPITAL).powi(2) as usize;
-        size_of::<f64>() * texels * (self.line.text.chars().count() + 1)
-    }
-
     /// The rasterised glyphs.
     pub fn coverage(&self) -> &GlyphCoverage {
         self.coverage.get_or_init(|| GlyphCoverage::rasterize(&self.line))

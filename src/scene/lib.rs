@@ -45,11 +45,9 @@ mod decal;
 mod fingerprint;
 mod light;
 mod mesh_colours;
-mod plausibility;
 mod scale;
 mod variation;
 mod visual;
-mod visual_warnings;
 
 use std::sync::Arc;
 

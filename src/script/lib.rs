@@ -30,7 +30,6 @@ pub use vm::{
     PrintSink, VmLimits,
     error::ScriptError,
     library::{ScriptFiles, embedded, embedded_scripts},
-    set_stuck_handler,
     watchdog::StuckHandler,
 };
 

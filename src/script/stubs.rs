@@ -8,7 +8,7 @@ use super::{
     api::{self, goals::GoalSpec, shapes::SHAPES, tasks::SETTINGS_CLASS, visuals::MASKS},
     plan::options,
     schema::{
-        Class, Field, FieldDefault, Function, LuaType, Record, Signature, Type,
+        Class, Field, FieldDefault, Function, Record, Signature, Type,
         function::Param,
         object::{Access, LuaField},
     },
@@ -40,7 +40,7 @@ fn records() -> Vec<&'static Record> {
     }
     fn add_nested(records: &mut Vec<&'static Record>, ty: &Type) {
         match ty {
-            Type::List(of) | Type::Map(of) => add_nested(records, of),
+            Type::List(of) | Type::Distinct { of, .. } | Type::Map(of) => add_nested(records, of),
             Type::OneOf(types) => types.iter().for_each(|ty| add_nested(records, ty)),
             Type::Nested(record) => add(records, record),
             Type::Constructed(made) => made.iter().for_each(|record| add(records, record)),
@@ -62,10 +62,7 @@ fn records() -> Vec<&'static Record> {
 const GOAL: &str = "softvt.Goal";
 
 fn goal_classes() -> String {
-    match <GoalSpec as LuaType>::TYPE {
-        Type::Constructed(records) => classes(records),
-        _ => String::new(),
-    }
+    classes(GoalSpec::RECORDS)
 }
 
 fn classes(records: &[&Record]) -> String {
@@ -79,7 +76,9 @@ fn lua_type(ty: &Type) -> String {
         Type::Integer(_) => "integer".into(),
         Type::Text | Type::Line | Type::Name => "string".into(),
         Type::Boolean => "boolean".into(),
-        Type::Vector(..) | Type::Direction([], _) | Type::Quaternion(_) => "number[]".into(),
+        Type::Vector(..) | Type::Interval(..) | Type::Direction([], _) | Type::Quaternion(_) => {
+            "number[]".into()
+        }
         Type::Direction(names, _) => format!("{}|number[]", lua_type(&Type::Choice(names))),
         Type::Choice(names) => names.iter().map(|name| format!("\"{name}\"")).collect::<Vec<_>>().join("|"),
         Type::Function(signature) | Type::Table(signature) => (*signature).into(),
@@ -87,6 +86,7 @@ fn lua_type(ty: &Type) -> String {
             Type::OneOf(_) | Type::Choice(_) | Type::Function(_) => format!("({})[]", lua_type(of)),
             of => format!("{}[]", lua_type(of)),
         },
+        Type::Distinct { of, .. } => lua_type(&Type::List(of)),
         // Settings are the only table of tables of any values.
         Type::Map(Type::Map(Type::Any)) => SETTINGS_CLASS.into(),
         Type::Map(of) => format!("table<string, {}>", lua_type(of)),
@@ -107,6 +107,7 @@ fn details(doc: &str, ty: &Type, presence: FieldDefault) -> String {
         Type::Number(..)
         | Type::Integer(_)
         | Type::Vector(..)
+        | Type::Interval(..)
         | Type::Direction(..)
         | Type::Quaternion(_) => format!(" Expects {}.", ty.describe()),
         _ => String::new(),
@@ -343,7 +344,7 @@ folder, its parent folder and the current folder, then in the library inside the
 `pairs` and `next` go over numbers, strings and booleans in order. Several other keys in one table have none: an error.
 Reading a variable that is not defined is an error; `rawget(_G, name)` returns nil instead.
 `tostring` returns the type of a table or function, never an address. `print` writes to standard error, up to 1 MiB. Memory
-and time are limited: 256 MiB of Lua values, 512 MiB of images, shapes and masks, shapes of at most 2000 parts, masks of at
+and time are limited: 256 MiB of Lua values, 512 MiB of images and shapes, shapes of at most 2000 parts, masks of at
 most 200, 4 KiB per name or prompt, 1 MiB per `load`, and 64 MiB in what a script returns.
 
 A list that belongs to an object (`scene.base`, `material.albedo`, `scene.objects`) is not a copy: a number written to it is

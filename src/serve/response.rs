@@ -29,7 +29,7 @@ const OBSERVATION_DEPENDENT: &str = "camera_inside";
 
 /// Result of a step.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Executed {
+pub(super) struct StepResult {
     /// Number of actions that were executed.
     pub count: usize,
     /// True if the finished episode was recorded; `None` before its end, and if the server records nothing.
@@ -84,7 +84,7 @@ pub(super) fn transition(
     kind: &str,
     live: &mut LiveEpisode,
     config: &ServerConfig,
-    executed: Option<Executed>,
+    executed: Option<StepResult>,
 ) -> Result<Value, RequestError> {
     let observation = live.observe(config)?;
     let succeeded = live.has_succeeded();
@@ -155,7 +155,7 @@ fn info(
     live: &LiveEpisode,
     config: &ServerConfig,
     observation: &Observation,
-    executed: Option<Executed>,
+    executed: Option<StepResult>,
 ) -> Value {
     let mut info = Map::new();
     let mut put = |name: &str, value| info.insert(name.to_owned(), value);
@@ -168,7 +168,7 @@ fn info(
     put("far_commands", json!(live.episode.far_commands()));
     put("clamped_grips", json!(live.episode.clamped_grips()));
     put("clamped_steps", json!(live.episode.clamped_steps()));
-    if let Some(Executed { count, recorded }) = executed {
+    if let Some(StepResult { count, recorded }) = executed {
         put("carried_out", json!(count));
         if let Some(recorded) = recorded {
             put("recorded", json!(recorded));

@@ -9,7 +9,7 @@ use super::{
     config::{RequestError, ServerConfig},
     render_budget::{MAX_RENDER_PIXELS, RenderBudget},
     request::Request,
-    response::{self, Executed},
+    response::{self, StepResult},
     state::{ActionRow, EpisodeState, LiveEpisode},
 };
 use softvt_common::cancel::CancelFlag;
@@ -147,7 +147,12 @@ impl<'a> ClientSession<'a> {
         }
         let recorded = self.record_if_over()?;
         let config = self.config;
-        response::transition("step", self.live("step")?, config, Some(Executed { count: executed, recorded }))
+        response::transition(
+            "step",
+            self.live("step")?,
+            config,
+            Some(StepResult { count: executed, recorded }),
+        )
     }
 
     /// Records the episode if it is over and this attempt at it counts. Returns whether it was recorded; `None` before

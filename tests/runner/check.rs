@@ -116,14 +116,12 @@ fn a_soft_body_of_few_voxels_across_is_doubted() {
 fn implausible_units_and_wide_objects_are_doubted() {
     let of = |small: Small| warnings(&small.project());
     let light = of(Small { material: "youngs_pa = 40, poisson = 0.3, density = 0.3", ..Small::default() });
-    assert!(
-        light.contains("asset cube: youngs_pa is 40 Pa, softer than a gel; did you mean 40 kPa"),
-        "{light}"
-    );
-    assert!(
-        light.contains("asset cube: density is 0.3 kg/m³, lighter than foam; did you mean 0.3 g/cm³"),
-        "{light}"
-    );
+    for expected in [
+        "x.lua:3: asset.body.youngs_pa: 40 Pa is outside of the usual range 300..10000000 Pa; ×1000 would be inside",
+        "x.lua:3: asset.body.density: 0.3 kg/m³ is outside of the usual range 5..23000 kg/m³; ×1000 would be inside",
+    ] {
+        assert!(light.contains(expected), "{light}");
+    }
     let wide =
         of(Small { shape: "softvt.shape.box { size = { 0.12, 0.1, 0.04 } }:grounded()", ..Small::default() });
     assert!(wide.contains("asset cube: it is 100 mm wide, and the gripper opens 80 mm"), "{wide}");
@@ -131,7 +129,7 @@ fn implausible_units_and_wide_objects_are_doubted() {
     assert!(of(Small::default()).starts_with("object post: it is at (0, 2) m, outside of the workspace"));
     assert_eq!(of(Small::default()).lines().count(), 1);
     let soft = of(Small { material: "youngs_pa = 600, poisson = 0.3, density = 900", ..Small::default() });
-    assert!(soft.contains("asset cube: it sags to about 71 % of its height under its own weight"), "{soft}");
+    assert!(soft.contains("asset cube: its own weight presses it down by 29 %: it is 40 mm high"), "{soft}");
     let off = of(Small {
         shape: "softvt.shape.box { size = { 0.04, 0.04, 0.04 } }:grounded():translate(0.03, 0, 0)",
         ..Small::default()
@@ -155,12 +153,10 @@ fn implausible_units_and_wide_objects_are_doubted() {
     let beside = "asset cube: hints.grasp_width_m is 20000 mm, and the object is 40 × 40 × 40 mm; lengths are in metres";
     assert!(misspelt.contains(beside), "{misspelt}");
     for (hints, expected) in [
-        ("grasp_width_m = 0.004", "hints.grasp_width_m is 4 mm, and it is 40 mm wide at that height"),
         ("grasp_width_m = 0.02", ""),
         ("grasp_offset_m = 0.03", "hints.grasp_offset_m is 30 mm, and the object is 40 × 40 × 40 mm"),
         ("surface_m = 20", "hints.surface_m is 20000 mm, and the object is 40 × 40 × 40 mm"),
         ("wall_m = -0.001", "hints.wall_m is -1 mm, and the object is 40 × 40 × 40 mm"),
-        ("carry_pace = 0", "hints.carry_pace is 0; expected a number above 0, at most 1"),
     ] {
         let hinted = format!("hints = {{ {hints} }}, name = \"cube\", shape");
         let text = Small::default().text().replace("name = \"cube\", shape", &hinted);
@@ -175,7 +171,7 @@ fn implausible_units_and_wide_objects_are_doubted() {
         .replace("softvt.soft { youngs_pa = 2e4, poisson = 0.3,", "softvt.rigid {");
     let pieces = warnings(&Project::new(&[("x.lua", &text)]));
     assert!(pieces.contains("asset cube: its shape has 2 separate pieces, "), "{pieces}");
-    let expected = "task 0: its goal moves no soft object, only cube, so that no deformation is judged";
+    let expected = "task 0: its goal moves no soft object, only cube: no deformation is judged";
     assert!(pieces.contains(expected), "{pieces}");
 }
 
@@ -200,20 +196,21 @@ fn joints_in_other_units_and_parts_away_from_their_object_are_doubted() {
     assert!(!slider("upper = 0.1, friction = 1, damping = 6").contains("chest"));
     let long = slider("upper = 100, friction = 1e6");
     assert!(
-        long.contains(
-            "asset chest: part tray: its slider moves from 0 to 100 m, and the object is 100 mm long"
-        ),
+        long.contains("slider.upper: 100 m is outside of the usual range -2..2 m; ×0.001 would be"),
         "{long}"
     );
-    assert!(long.contains("asset chest: part tray: its friction is 1000000 N"), "{long}");
+    assert!(long.contains("slider.friction: 1000000 N is outside of the usual range 0..100 N"), "{long}");
     let hinge = of(
         "0, 0, 0.04",
         "softvt.hinge { axis = { 1, 0, 0 }, origin = { 0, 80, 0 }, lower = 0, upper = 1, damping = 1e9 }",
     );
-    assert!(hinge.contains("part tray: the origin of its hinge, (0, 80, 0) m, is 79950 mm away"), "{hinge}");
-    assert!(hinge.contains("part tray: its damping takes 600000000 N m at 0.6 rad/s"), "{hinge}");
+    assert!(
+        hinge.contains("hinge.origin: 80 m is outside of the usual range -2..2 m; ×0.001 would"),
+        "{hinge}"
+    );
+    assert!(hinge.contains("hinge.damping: 1e9 N m s/rad is outside of the usual range 0..30"), "{hinge}");
     let away = of("0.6, 0, 0.04", "softvt.slider { axis = { -1, 0, 0 }, lower = 0, upper = 0.1 }");
-    assert!(away.contains("part tray: it is 500."), "{away}");
+    assert!(away.contains("part tray: it is 500"), "{away}");
 }
 
 #[test]
@@ -300,15 +297,15 @@ fn a_camera_that_shows_nothing_of_the_goal_is_a_warning() {
         warnings(&Project::new(&[("x.lua", &changed)]))
     };
     let near_sighted = of("far = 0.3");
-    let expected = "camera third_person: cube, post are not in its view at the start; change where it is, its look_at, \
+    let expected = "camera third_person: nothing of the goal (cube, post) is in its view; change where it is, its look_at, \
                     or its far, 0.3 m";
     assert!(near_sighted.contains(expected), "{near_sighted}");
-    assert!(of("position = { 0.6, 0, -2 }").contains("not in its view"));
+    assert!(of("position = { 0.6, 0, -2 }").contains("nothing of the goal"));
     assert!(!of("far = 3").contains("in its view"));
 }
 
 #[test]
-fn shifts_whose_default_changes_the_scene_or_that_change_nothing_are_told() {
+fn shifts_that_change_nothing_are_refused() {
     let of = |change: &str| {
         let shift = format!(
             "shifts = {{ softvt.shift {{ name = 'stiff', default = 1, min = 0.1, max = 3, apply = function(scene, value)\n\
@@ -320,37 +317,13 @@ fn shifts_whose_default_changes_the_scene_or_that_change_nothing_are_told() {
         Project::new(&[("x.lua", &shifted)])
     };
     let object = "scene.goal_object.youngs_pa = scene.goal_object.youngs_pa";
-    let expected = "shift stiff: its default, 1, changes the scene; give the value that changes nothing";
-    assert!(warnings(&of(&format!("{object} * (value + 1)"))).contains(expected));
     let sound = of(&format!("{object} * value"));
-    assert!(!warnings(&sound).contains("shift stiff"));
     let with_value = |project: &Project| {
         project.run("x.lua").shift("stiff", 0.5).check().map_err(|error| project.relative(error))
     };
     assert!(with_value(&sound).is_ok());
     let message = with_value(&of("local y = scene.goal_object.youngs_pa * value")).unwrap_err();
     assert!(message.contains("changes nothing in suite") && message.contains("stiff=0.5"), "{message}");
-}
-
-#[test]
-fn two_layouts_of_one_name_that_differ_are_a_warning() {
-    let of = |cube_y: f64| {
-        let text = Small::default().text();
-        let start = text.find("local layout").expect("a layout");
-        let (end, task) =
-            (text.find("return").expect("a suite"), text.find("  softvt.task").expect("a task"));
-        let other = text[start..end]
-            .replace("local layout", "local other")
-            .replace("0, 0.1", &format!("0, {cube_y}"));
-        let second = text[task..].replace("wait\"", "wait longer\"").replace("= layout", "= other");
-        let tasks = text[task..].trim_end().trim_end_matches("} }");
-        let text = format!("{}{other}{}{tasks}{second}", &text[..end], &text[end..task]);
-        warnings(&Project::new(&[("x.lua", &text)]))
-    };
-    let expected = "tasks 0 and 1: both layouts have the name \"one\", and place cube differently";
-    let differing = of(0.12);
-    assert!(differing.contains(expected), "{differing}");
-    assert!(!of(0.1).contains("layouts have the name"));
 }
 
 #[test]
@@ -399,16 +372,14 @@ fn scenes_of_later_episodes_are_checked_on_request() {
 }
 
 #[test]
-fn images_that_show_nothing_and_tiny_budgets_are_doubted() {
+fn near_sighted_cameras_and_tiny_budgets_are_doubted() {
     let of = |at| warnings(&Small { at, ..Small::default() }.project());
     let blind = of("at = { 0, 0.1 } } scene:add_camera { name = \"tip\", mount = \"hand\", \
          position = { 0.05, 0, 0 }, look_at = { 0.05, 0, 1 }, up = { 1, 0, 0 }, near = 0.001, far = 0.02 } local _ = {");
-    let expected = "camera tip: its far is 0.02 m, and the tool centre point is 0.115 m away";
+    let expected = "scene:add_camera.far: 0.02 m is outside of the usual range 0.15..1000 m";
     assert!(blind.contains(expected), "{blind}");
-    let dark = of("at = { 0, 0.1 } } scene.light.strength = 0 scene.light.sky_strength = 0 local _ = {");
-    assert!(dark.contains("scene.light: it is so weak that the images of all cameras are black"), "{dark}");
     let short = warnings(&Small { task: "budget_steps = 9", ..Small::default() }.project());
-    assert!(short.contains("task 0: budget_steps is 9, 0.45 s; no episode can reach its goal"), "{short}");
+    assert!(short.contains("task.budget_steps: 9 is outside of the usual range 10..20000"), "{short}");
 }
 
 #[test]
@@ -446,26 +417,20 @@ fn friction_that_loosens_no_grip_is_told_with_what_set_it() {
     let reason = "a pair of surfaces takes the larger coefficient, which is at least";
     let run =
         |change: &str, value: f64| project.run("x.lua").policy("noop").shift(change, value).finish().messages;
-    let told = format!(
-        "warning: shift friction=0.02: grips of cube are no looser with its static_mu of 0.012, since {reason} 1.5 on the pads; "
-    );
+    let told = format!("warning: object cube: its static_mu is 0.012, and {reason} 0.6 on pads and tables; ");
     assert!(run("friction", 0.02).contains(&told), "{}", run("friction", 0.02));
     assert!(!run("friction", 3.0).contains(reason) && !run("mass", 2.0).contains(reason));
     let varied = |range: &str| {
         project.write("v.lua", friction_variation(range).as_bytes());
         project.run("x.lua").with(|config| config.vary = Some(project.path("v.lua")))
     };
-    let of_asset = |range: &str| {
-        format!(
-            "variation v: its factors on friction give objects a static_mu in {range}, and {reason} 0.6 on pads and tables"
-        )
-    };
+    let least = format!("object cube: its static_mu is 0.066, and {reason} 0.6 on pads and tables");
     let messages = |range: &str| varied(range).policy("noop").finish().messages;
-    assert!(messages("{ 0.1, 0.11 }").contains(&of_asset("0.06..0.066")), "{}", messages("{ 0.1, 0.11 }"));
+    assert!(messages("{ 0.1, 0.11 }").contains(&least), "{}", messages("{ 0.1, 0.11 }"));
     assert!(!messages("{ 0.7, 1.4 }").contains(reason), "a part of them changes how objects slide on tables");
     let checked = |range: &str| varied(range).check().expect("valid").join("\n");
     let told = checked("{ 0.1, 0.11 }");
-    assert!(told.contains(&of_asset("0.06..0.066")) && !told.contains("asset cube: friction"), "{told}");
+    assert!(told.contains(&least), "{told}");
     assert!(!checked("{ 0.7, 1.4 }").contains(reason));
     let of_layout = |at| warnings(&Small { at, ..Small::default() }.project());
     let by_layout = of_layout("at = { 0, 0.1 } } scene:object('cube').static_mu = 0.5 local _ = {");

@@ -82,7 +82,7 @@ fn invalid_conditions_are_reported_before_anything_runs() {
         message
     };
     for (conditions, expected) in [
-        ("", "suites/trial.lua:1: conditions.conditions: expected at least one, got an empty list"),
+        ("", "suites/trial.lua:1: conditions.conditions: expected at least 1, got 0"),
         (
             "{ name = \"a\", shift = { mas = 2 } }",
             "suites/trial.lua: shifts: unknown shift \"mas\"; did you mean \"mass\"? (suite one, condition \"a\")",

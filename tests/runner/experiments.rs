@@ -87,7 +87,7 @@ fn experiments_without_results_are_refused() {
     let run = "run = function(point) return { b = point.a } end";
     assert!(
         problem(&format!("grid = {{ a = {{}} }}, {run}"))
-            .contains("experiment.grid.a: expected at least one value")
+            .contains("experiment.grid.a: expected at least 1, got 0")
     );
     let points = format!("points = function() return {{ a = 1 }} end, {run}");
     assert!(problem(&points).contains("experiment.points: expected a list of at least one table"));
@@ -99,8 +99,8 @@ fn experiments_without_results_are_refused() {
     assert_snapshot!(problem(misspelt), @r#"x.lua:2: point: unknown key "aa"; did you mean "a"? (point 0 {"a":1})"#);
     let listed = "points = function() return { { young = 1 }, { change = 2 } } end, run = function(p) return { b = p.change or p.youngs } end";
     assert_snapshot!(problem(listed), @r#"x.lua:2: point: unknown key "youngs"; did you mean "young"? (point 0 {"young":1})"#);
-    assert_snapshot!(problem(&format!("grid = {{ a = {{ 1, 2, 1 }} }}, {run}")), @"x.lua:2: experiment.grid.a: has 1 twice; give each value once");
-    assert_snapshot!(problem(&format!("grid = {{ a = {{ 1 }} }}, columns = {{ 'b', 'b' }}, {run}")), @r#"x.lua:2: experiment.columns: has "b" twice; give each once"#);
+    assert_snapshot!(problem(&format!("grid = {{ a = {{ 1, 2, 1 }} }}, {run}")), @"x.lua:2: experiment.grid.a[3]: 1 is there already; give each once");
+    assert_snapshot!(problem(&format!("grid = {{ a = {{ 1 }} }}, columns = {{ 'b', 'b' }}, {run}")), @r#"x.lua:2: experiment.columns[2]: "b" is there already; give each once"#);
     let columns = format!("grid = {{ a = {{ 1 }} }}, columns = {{ 'bb' }}, {run}");
     assert!(
         problem(&columns).contains(

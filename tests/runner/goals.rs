@@ -112,12 +112,12 @@ fn wrong_goals_are_refused_at_their_line() {
     assert_snapshot!(error("softvt.opened { joint = 'chest.tray' }"), @"x.lua:12: task.object: missing; the goal names no object, and the deformation and grip of one are judged: give its scene name");
     assert_snapshot!(error("softvt.all { on, softvt.opened { joint = 'chest.try' } }"), @r#"x.lua:11: task.goal.joint: unknown joint "chest.try"; did you mean "chest.tray"?"#);
     assert_snapshot!(error("softvt.all { on, softvt.none { softvt.any { on } } }"), @r#"x.lua:12: task.goal: can never be met: "block on chest.tray" must hold and must not hold"#);
-    assert_snapshot!(error("softvt.stacked { objects = { 'block', 'chest', 'block' } }"), @r#"x.lua:11: task.goal.objects: names "block" twice; give each object once"#);
+    assert_snapshot!(error("softvt.stacked { objects = { 'block', 'chest', 'block' } }"), @r#"x.lua:11: task.goal.objects[3]: "block" is there already; give each once"#);
     assert_snapshot!(error("softvt.stacked { objects = { 'chest', 'blok' } }"), @r#"x.lua:11: task.goal.objects: unknown object "blok"; did you mean "block"?"#);
     assert_snapshot!(error("softvt.all { softvt.stacked { objects = { 'chest', 'block' } }, softvt.on { object = 'chest', target = 'block' } }"), @"x.lua:12: task.goal: can never be met: block, chest rest on each other in a circle");
     assert_snapshot!(error("softvt.near { object = 'chest.tray', target = 'block' }"), @r#"x.lua:11: task.goal.object: "chest.tray" is a part of chest, which stays on its joint; name an object whose body is softvt.soft or softvt.rigid"#);
     assert_snapshot!(error("softvt.all { on, softvt.turned { joint = 'chest.tray', range = { 2, 3 } } }"), @"x.lua:8: task 0: goal.range is beyond the limits of chest.tray, 0..0.08");
-    assert_snapshot!(error("softvt.all { on, softvt.turned { joint = 'chest.tray', range = { 2, 1 } } }"), @"x.lua:11: task.goal.range: the lowest value 2 is above the highest, 1; swap them");
+    assert_snapshot!(error("softvt.all { on, softvt.turned { joint = 'chest.tray', range = { 2, 1 } } }"), @"x.lua:11: task.goal.range: the lowest value, 2, is above the highest, 1; swap them");
     let at_once = |other: &str| {
         error(&format!(
             "softvt.all {{ on, softvt.opened {{ joint = 'chest.tray', share = 0.75 }}, {other} }}"
@@ -127,7 +127,7 @@ fn wrong_goals_are_refused_at_their_line() {
     assert_snapshot!(error("softvt.near { object = 'block', target = 'chest', distance = 0 }"), @"x.lua:11: task.goal.distance: expected metres in 0.001..1.5, got 0");
     assert_snapshot!(error("softvt.left_of { object = 'block', target = 'chest', distance = 8 }"), @"x.lua:11: task.goal.distance: expected metres in 0..1.5, got 8");
     assert_snapshot!(error("softvt.left_of { object = 'block', target = 'chest', side = 'right_of' }"), @"x.lua:11: task.goal.side: softvt.left_of is this side already; leave side out, or write softvt.beside");
-    assert_snapshot!(error("softvt.stacked { objects = { 'block' } }"), @"x.lua:11: task.goal.objects: expected at least two objects, from the lowest on");
+    assert_snapshot!(error("softvt.stacked { objects = { 'block' } }"), @"x.lua:11: task.goal.objects: expected at least 2, got 1");
     assert_snapshot!(error("softvt.left_of { object = 'block' }"), @"x.lua:11: task.goal.target: missing; expected a string that is not empty");
     assert_snapshot!(error("softvt.near { object = 'block', target = 'block' }"), @r#"x.lua:11: task.goal.target: is "block", which is the object itself; name what it must reach"#);
 }

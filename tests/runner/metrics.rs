@@ -70,7 +70,7 @@ fn wrong_metrics_are_refused() {
     let refusal = |metrics: &str| project(metrics).run("x.lua").error();
     let metric = |fields: &str| format!("softvt.metric {{ {fields} }}");
     let good = metric("name = 'm', of = function() end");
-    assert_snapshot!(refusal(&format!("{good}, {good}")), @r#"x.lua:9: suite.metrics: two are named "m"; give each a name of its own"#);
+    assert_snapshot!(refusal(&format!("{good}, {good}")), @r#"x.lua:9: suite.metrics[2]: "m" is there already; give each once"#);
     assert_snapshot!(refusal(&metric("name = 'm', over = 'sum', of = function() end")), @r#"x.lua:9: metric.over: expected one of "last", "max", "min", "mean", got "sum""#);
     for name in ["safety", "goal", "d_peak", "tau", "privileged", "steps", "attempts", "seed", "outcome"] {
         let message = refusal(&metric(&format!("name = '{name}', of = function() end")));

@@ -9,7 +9,7 @@ use softvt::{
         Action, ActionChunk, EpisodeBrief, Observation, Policy, PolicyError, RobotState, SensorStreams,
     },
     report::{styled_text::TerminalFormat, terminal},
-    rollout::{AssetCache, ChunkedPolicy, Episode, EpisodeSpec, SensorAssets, Sensors, Simulation},
+    rollout::{AssetCache, ChunkedPolicy, Episode, EpisodeSpec, Sensors, Simulation},
     runs::{record::EpisodeRecord, summary::SuiteSummary},
     script::{self, LoadedScript},
     sensing::tactile::TactileMosaicLayout,
@@ -52,8 +52,7 @@ fn played(project: &Project, streams: SensorStreams) -> Result<(Vec<Observation>
     let (id, scene) = (episode_id(&suite.name, 0), opened.scene.clone());
     let spec = EpisodeSpec::new(id, "witness", &suite.tasks[0], &opened.nominal, scene, &suite.settings);
     assert_eq!((spec.header.asset.as_str(), spec.header.soft), ("cube", true));
-    let episode =
-        Episode::start(spec, &AssetCache::default(), &SensorAssets::default()).map_err(|e| e.to_string())?;
+    let episode = Episode::start(spec, &AssetCache::default()).map_err(|e| e.to_string())?;
     let mut witness = RecordingPolicy { streams, seen: Vec::new() };
     let brief = EpisodeBrief {
         suite: "one".into(),
@@ -268,7 +267,7 @@ fn loaded() -> LoadedScript {
 fn left_and_right_are_those_of_the_image() {
     let loaded = loaded();
     let Plan::Suite(suite) = &loaded.plan else { panic!("a suite") };
-    let (settings, rests, looks) = (Settings::default(), AssetCache::default(), SensorAssets::default());
+    let (settings, assets) = (Settings::default(), AssetCache::default());
     for task in &suite.tasks {
         let scene = script::EpisodeSetup::open(
             &loaded,
@@ -278,8 +277,8 @@ fn left_and_right_are_those_of_the_image() {
         .expect("it opens")
         .scene;
         let sim =
-            Simulation::new(Arc::new(scene), &settings.physics, &settings.robot, &rests).expect("it builds");
-        let mut senses = Sensors::new(&sim, &settings.tactile, &looks);
+            Simulation::new(Arc::new(scene), &settings.physics, &settings.robot, &assets).expect("it builds");
+        let mut senses = Sensors::new(&sim, &settings.tactile, &assets);
         let camera = senses.camera("third_person").expect("there").clone();
         let picture = senses.render(&Sensors::frame(&sim), &camera).expect("drawn");
         let column = |name: &str| {

@@ -1,5 +1,7 @@
 //! `softvt check`: validation of a script without running its plan.
 
+use std::collections::BTreeSet;
+
 use clap::Args;
 
 use crate::{
@@ -38,16 +40,16 @@ pub(super) fn run(args: CheckArgs) -> Result<(), CliError> {
     let ConfiguredScript { config, script: loaded } = &run;
     let plan = &loaded.plan;
     check_distinct_out_dirs(config, plan.suites())?;
-    for place in loaded.unused_shapes()? {
-        eprint_notice(format!(
-            "warning: {place}: makes a shape that is not used; the methods of a shape return a new one: shape = shape:translate(…)"
-        ));
-    }
+    let mut told = BTreeSet::new();
+    let mut warn = |warning: String| {
+        if told.insert(warning.clone()) {
+            eprint_notice(format!("warning: {warning}"));
+        }
+    };
+    loaded.warnings()?.into_iter().for_each(&mut warn);
     let checker = SuiteChecker::new(&run);
     for suite in plan.suites() {
-        checker.check(suite, args.episodes.unwrap_or(1), |warning| {
-            eprint_notice(format!("warning: {warning}"))
-        })?;
+        checker.check(suite, args.episodes.unwrap_or(1), &mut warn)?;
         print_tasks(suite)?;
     }
     match plan {

@@ -1,7 +1,5 @@
 //! Bounding boxes of shapes.
 
-use std::sync::{Mutex, PoisonError};
-
 use super::{
     combine::SignedDistance,
     displacement::SurfaceRelief,
@@ -9,13 +7,6 @@ use super::{
     warp::Axis,
 };
 use crate::{Aabb, Vec3};
-
-/// Bounds that were found by a search, the most recently used last. Scripts make the same assets
-/// anew for every episode.
-static FOUND: Mutex<Vec<(Shape, Aabb)>> = Mutex::new(Vec::new());
-
-/// Largest number of bounds that are kept.
-const MOST_FOUND: usize = 128;
 
 /// Cells along the longest edge in the search for the extreme points of a composite shape.
 const CELLS: f64 = 40.0;
@@ -28,34 +19,14 @@ impl Shape {
     /// Exact for primitives, and for placements, scalings, roundings and unions of them. For other shapes the extreme
     /// points are searched on the surface, to about 1 µm. This takes milliseconds, so callers should cache the result.
     pub fn bounds(&self) -> Aabb {
-        let exact = |axis: usize, sign: f64| self.support(&Vec3::ith(axis, sign)).map(|s| s * sign);
-        let corner = |sign: f64| Some(Vec3::new(exact(0, sign)?, exact(1, sign)?, exact(2, sign)?));
-        match (corner(-1.0), corner(1.0)) {
-            (Some(min), Some(max)) => Aabb { min, max },
-            _ => self.known_bounds(),
-        }
+        self.closed_bounds().unwrap_or_else(|| self.search_bounds())
     }
 
-    /// Those of [`Self::search_bounds`], from [`FOUND`] if they were found before.
-    fn known_bounds(&self) -> Aabb {
-        let found = || FOUND.lock().unwrap_or_else(PoisonError::into_inner);
-        let keep = |list: &mut Vec<(Self, Aabb)>, entry: (Self, Aabb)| {
-            if list.len() == MOST_FOUND {
-                list.remove(0);
-            }
-            list.push(entry);
-        };
-        let mut list = found();
-        if let Some(at) = list.iter().position(|(shape, _)| shape == self) {
-            let entry = list.remove(at);
-            let bounds = entry.1;
-            keep(&mut list, entry);
-            return bounds;
-        }
-        drop(list);
-        let bounds = self.search_bounds();
-        keep(&mut found(), (self.clone(), bounds));
-        bounds
+    /// The tight bounding box, where it has a closed form, which takes microseconds.
+    pub fn closed_bounds(&self) -> Option<Aabb> {
+        let exact = |axis: usize, sign: f64| self.support(&Vec3::ith(axis, sign)).map(|s| s * sign);
+        let corner = |sign: f64| Some(Vec3::new(exact(0, sign)?, exact(1, sign)?, exact(2, sign)?));
+        Some(Aabb { min: corner(-1.0)?, max: corner(1.0)? })
     }
 
     /// True if a cheap test proves that the shape is more than `reach` (m) away from `p`; false leaves it open.

@@ -320,6 +320,8 @@ pub(super) fn to_local(pose: &Pose, p_o: &Vec3) -> Vec3 {
 pub struct ShapeTreeSize {
     /// Number of nodes, including the root.
     pub nodes: usize,
+    /// Approximate memory, bytes.
+    pub bytes: usize,
     /// Depth, including the root.
     pub depth: usize,
     /// Approximate number of primitives evaluated per exact distance. Nested combinations multiply: each step of the
@@ -330,6 +332,10 @@ pub struct ShapeTreeSize {
 /// Evaluations of each part per distance to a combination near its surface: the point itself, the foot point on the
 /// nearest part, and the refined foot point.
 const EVALUATIONS: f64 = 3.0;
+
+/// Memory of a corner of a profile with its edge, and of a triangle of a solid.
+const BYTES_PER_CORNER: usize = 128;
+const BYTES_PER_TRIANGLE: usize = 400;
 
 impl Shape {
     pub(super) fn children(&self) -> Vec<&Self> {
@@ -356,10 +362,18 @@ impl Shape {
             Self::Displace { reliefs, .. } => reliefs.len().max(1),
             _ => 1,
         };
+        let content = match self {
+            Self::Prism { section, .. } => BYTES_PER_CORNER * section.points().len(),
+            Self::Lathe(profile) => BYTES_PER_CORNER * profile.points().len(),
+            Self::Mesh(solid) => BYTES_PER_TRIANGLE * solid.mesh().triangles.len(),
+            _ => 0,
+        };
         let exact = matches!(self, Self::Union(_) | Self::Intersect(_) | Self::Subtract { .. });
-        let mut size = ShapeTreeSize { nodes: own, depth: 0, work: 0.0 };
+        let mut size =
+            ShapeTreeSize { nodes: own, bytes: own * size_of::<Self>() + content, depth: 0, work: 0.0 };
         for part in self.children().into_iter().map(Self::tree_size) {
             size.nodes += part.nodes;
+            size.bytes += part.bytes;
             size.depth = size.depth.max(part.depth);
             size.work += part.work;
         }

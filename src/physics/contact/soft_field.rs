@@ -85,7 +85,7 @@ impl<'a> DeformedSdf<'a> {
     fn map_to_rest(&self, p: &Vec3) -> Option<RestPoint> {
         let mesh = &self.body.model.mesh;
         let guess = self.body.frame.tr_mul(&(p - self.centre_w)) + self.centre_o;
-        let mut element = mesh.locate(&guess).map_or_else(|| self.nearest(p), |at| at.element);
+        let mut element = mesh.locate(&guess).map_or_else(|| self.nearest_element(p), |at| at.element);
         for _ in 0..MAX_VISITED_VOXELS {
             let (local, step, jacobian) = self.invert(element, p)?;
             match self.neighbour(element, &(local + step)) {
@@ -144,7 +144,7 @@ impl<'a> DeformedSdf<'a> {
     }
 
     /// The element whose centre is nearest to a world point.
-    fn nearest(&self, p: &Vec3) -> u32 {
+    fn nearest_element(&self, p: &Vec3) -> u32 {
         let middle = |nodes: &[u32; 8]| nodes.iter().map(|&n| self.body.x[n as usize]).sum::<Vec3>() / 8.0;
         let elements = self.body.model.mesh.elements.iter().enumerate();
         elements

@@ -13,12 +13,12 @@ pub struct ElasticMaterial {
 }
 
 impl ElasticMaterial {
-    /// Range of Young's modulus, Pa.
-    pub const YOUNGS_PA: Range = Range::POSITIVE;
+    /// Range of Young's modulus, Pa: usually from that of a soft gel to that of hard rubber.
+    pub const YOUNGS_PA: Range = Range::POSITIVE.usually(300.0, 1e7);
     /// Range of Poisson's ratio; 0.5 would be incompressible.
     pub const POISSON: Range = Range::below(0.0, 0.5);
-    /// Range of the density, kg/m³.
-    pub const DENSITY: Range = Range::POSITIVE;
+    /// Range of the density, kg/m³: usually from that of light foam to that of osmium.
+    pub const DENSITY: Range = Range::POSITIVE.usually(5.0, 23_000.0);
 
     /// A material with this Young's modulus (Pa), Poisson's ratio and density (kg/m³).
     ///

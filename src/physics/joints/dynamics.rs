@@ -13,14 +13,14 @@ use softvt_geometry::{Mat3, Pose, Vec3};
 
 /// A spatial velocity, acceleration or (moment, force) pair at the world origin.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-struct Spatial {
+struct SpatialVector {
     /// Angular velocity, or moment about the world origin.
     angular: Vec3,
     /// Velocity of the point at the world origin, or force.
     linear: Vec3,
 }
 
-impl Spatial {
+impl SpatialVector {
     fn plus(&self, other: &Self, scale: f64) -> Self {
         Self { angular: self.angular + other.angular * scale, linear: self.linear + other.linear * scale }
     }
@@ -66,8 +66,8 @@ impl Inertia {
         Self { mass: link.mass, first: com * link.mass, second: central + point_inertia(link.mass, &com) }
     }
 
-    fn momentum(&self, motion: &Spatial) -> Spatial {
-        Spatial {
+    fn momentum(&self, motion: &SpatialVector) -> SpatialVector {
+        SpatialVector {
             angular: self.second * motion.angular + self.first.cross(&motion.linear),
             linear: motion.linear * self.mass - self.first.cross(&motion.angular),
         }
@@ -75,10 +75,10 @@ impl Inertia {
 }
 
 /// Motions of unit joint speed, and inertias of the links.
-fn axes_and_inertias(tree: &JointTree, poses: &[Pose]) -> (Vec<Spatial>, Vec<Inertia>) {
+fn axes_and_inertias(tree: &JointTree, poses: &[Pose]) -> (Vec<SpatialVector>, Vec<Inertia>) {
     let axis = |index| {
         let LinkVelocity { linear, angular } = unit_joint_velocity(tree, poses, index, &Vec3::zeros());
-        Spatial { angular, linear }
+        SpatialVector { angular, linear }
     };
     (0..tree.dofs()).map(|index| (axis(index), Inertia::of(tree, poses, index))).unzip()
 }
@@ -113,12 +113,12 @@ pub fn bias(tree: &JointTree, poses: &[Pose], v: &[f64], gravity: &Vec3) -> DVec
     let (axes, inertias) = axes_and_inertias(tree, poses);
     let (mut velocities, mut accelerations, mut forces) = (Vec::new(), Vec::new(), Vec::new());
     // Weight enters as an upward acceleration of the base.
-    let base = (Spatial::default(), Spatial { angular: Vec3::zeros(), linear: -gravity });
+    let base = (SpatialVector::default(), SpatialVector { angular: Vec3::zeros(), linear: -gravity });
     for (index, link) in tree.links.iter().enumerate() {
         let (velocity, acceleration) =
             link.parent.map_or(base, |parent: usize| (velocities[parent], accelerations[parent]));
-        let velocity: Spatial = velocity.plus(&axes[index], v[index]);
-        let acceleration: Spatial = acceleration.plus(&velocity.cross_motion(&axes[index]), v[index]);
+        let velocity: SpatialVector = velocity.plus(&axes[index], v[index]);
+        let acceleration: SpatialVector = acceleration.plus(&velocity.cross_motion(&axes[index]), v[index]);
         let inertia = &inertias[index];
         let force =
             inertia.momentum(&acceleration).plus(&velocity.cross_force(&inertia.momentum(&velocity)), 1.0);

@@ -27,12 +27,12 @@ const SOFT_PIXEL: f32 = 4e-3;
 
 /// The objects of a scene as viewers draw them.
 pub(super) struct SceneGeometry {
-    objects: Vec<DrawnObject>,
+    objects: Vec<RenderedObject>,
     /// Names of the soft bodies, by id.
     soft_names: BTreeMap<usize, String>,
 }
 
-struct DrawnObject {
+struct RenderedObject {
     name: String,
     body: BodyId,
     pose_in_body: Pose,
@@ -53,7 +53,7 @@ impl SceneGeometry {
                 soft_names.insert(id.index(), name.clone());
             }
             let mesh = object.mesh.display_mesh(pixel)?;
-            objects.push(DrawnObject { name, body: object.body, pose_in_body: object.pose_in_body, mesh });
+            objects.push(RenderedObject { name, body: object.body, pose_in_body: object.pose_in_body, mesh });
         }
         Ok(Self { objects, soft_names })
     }
@@ -107,7 +107,7 @@ impl SceneGeometry {
         before: Option<&WorldSnapshot>,
         time_ns: u64,
     ) -> Option<SceneUpdate> {
-        let entity = |object: &DrawnObject| {
+        let entity = |object: &RenderedObject| {
             let soft = match (object.body, before) {
                 (BodyId::Soft(id), Some(before)) if before.soft(id) == frame.soft(id) => return None,
                 (BodyId::Soft(id), _) => Some(id),
@@ -154,7 +154,7 @@ impl<'a> SoftSkin<'a> {
     }
 }
 
-impl DrawnObject {
+impl RenderedObject {
     fn triangles(&self, object_pose: &Pose, skin: Option<&SoftSkin>) -> TriangleListPrimitive {
         let mesh = &self.mesh;
         let bindings = skin.map_or(&[][..], |_| &mesh.bindings);

@@ -3,13 +3,15 @@
 //! after the episode.
 
 mod close_up;
+mod error;
 
 use std::sync::Arc;
 
 pub use close_up::{CloseUp, strain_colour};
+pub use error::SensingError;
 
 use super::{
-    sensor_assets::{SensingError, SensorAssets},
+    asset_cache::AssetCache,
     sensor_noise::SensorSeed,
     simulation::{ObjectInstance, Simulation},
 };
@@ -36,7 +38,7 @@ use softvt_sensing::{
 
 /// The sensors of one simulation: the scene's cameras, two tactile sensors, and the true forces on the pads.
 ///
-/// Nothing is computed until it is requested. Meshes and skins come from shared [`SensorAssets`].
+/// Nothing is computed until it is requested. Meshes and skins come from shared [`AssetCache`].
 #[derive(Debug)]
 pub struct Sensors {
     scene: Arc<Scene>,
@@ -44,7 +46,7 @@ pub struct Sensors {
     robot: RobotSpec,
     articulation: ArticulationId,
     objects: Vec<ObjectInstance>,
-    assets: SensorAssets,
+    assets: AssetCache,
     /// Skins of `objects` that have pressed on a gel. Kept here, since many episodes share the cache of the assets.
     skins: Vec<Option<Arc<TactileSkin>>>,
     /// The state in which objects may stay.
@@ -92,7 +94,7 @@ const TAXELS: [usize; 2] = [25, 21];
 
 impl Sensors {
     /// The sensors of a simulation. Images take less time for objects that stay in its present state.
-    pub fn new(sim: &Simulation, spec: &TactileSpec, assets: &SensorAssets) -> Self {
+    pub fn new(sim: &Simulation, spec: &TactileSpec, assets: &AssetCache) -> Self {
         let WorldSnapshot { nodes, rigid, mut links, .. } = Self::frame(sim);
         // The robot never stays.
         links[sim.robot.articulation.index()].clear();
@@ -456,18 +458,14 @@ fn camera_w(camera: &Camera, view: &FrameView) -> Pose {
 ///
 /// # Errors
 /// The first invalid value, with the place in the script that set it.
-pub fn check_sensors(
-    scene: &Scene,
-    spec: &TactileSpec,
-    sensor_assets: &SensorAssets,
-) -> Result<(), SensingError> {
+pub fn check_sensors(scene: &Scene, spec: &TactileSpec, assets: &AssetCache) -> Result<(), SensingError> {
     check_cameras(&scene.cameras)
         .map_err(|(index, error)| SensingError::from(error).set_by(&scene.cameras[index]))?;
     check_names(&scene.cameras)?;
     check_light(&scene.lighting)?;
     // Other optics models read no files.
     if let OpticsModel::Taxim { .. } = spec.optics {
-        sensor_assets.sensor(spec)?;
+        assets.sensor(spec)?;
     }
     Ok(())
 }

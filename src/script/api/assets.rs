@@ -12,13 +12,14 @@ use super::{
 };
 use crate::{
     schema::{
-        Constructed, FromChecked, Record, RecordType, Type, check::invalid, functions, one_of, record,
-        record_of,
+        Constructed, FromChecked, HasTable, Record, RecordType, Type, check::invalid, functions,
+        is_constructed, one_of, record, record_of,
     },
-    vm::error::fail,
+    vm::error::{app_data, fail},
 };
 use softvt_common::text::format_number;
 use softvt_physics::{contact::Friction, fem::ElasticMaterial};
+use softvt_rollout::{AssetCache, asset_warnings};
 use softvt_scene::{Asset, Body, SoftMaterial, Visual};
 
 /// A coefficient of friction.
@@ -30,7 +31,7 @@ pub(crate) const DENSITY: Type = Type::Number("kg/m³", ElasticMaterial::DENSITY
 
 record_of! {
     /// Coulomb friction of a surface. A pair of surfaces has the larger of each coefficient, unless one is coated.
-    Friction: "softvt.Friction" as "friction" {
+    Friction: "softvt.Friction" as "friction", relation NotDecreasing(&["dynamic_mu", "static_mu"]) {
         /// Static coefficient.
         static_mu: f64 = COEFFICIENT => Number(Friction::STANDARD.static_mu);
         /// Dynamic coefficient, at most the static one.
@@ -85,7 +86,7 @@ record! {
     ScenerySpec: "softvt.Scenery" as "asset.body", constructor "softvt.scenery" {}
     /// A kind of object. Its shape at rest has its lowest point at z = 0 and its centre on the z axis (see
     /// softvt.Shape:grounded).
-    AssetSpec: "softvt.Asset" as "asset", constructor "softvt.asset", relations check_asset {
+    AssetSpec: "softvt.Asset" as "asset", constructor "softvt.asset", relation Checked(check_asset) {
         /// Name in results and calibration files.
         name: String = Type::Name;
         /// Shape, in metres.
@@ -119,7 +120,8 @@ fn check_asset(lua: &Lua, record: &Record, asset: &Table) -> mlua::Result<()> {
     let shape: LuaShape = FromChecked::from_checked(asset.raw_get("shape")?, lua)?;
     let body: BodySpec = FromChecked::from_checked(asset.raw_get("body")?, lua)?;
     let (is_handled, shape) = (matches!(body, BodySpec::Soft(_) | BodySpec::Rigid(_)), shape.copy());
-    let size = || shape.bounds().size();
+    let cache = app_data::<AssetCache>(lua)?;
+    let size = || cache.bounds(&shape).size();
     if is_handled && shape.loose_bounds().size().max() > MAX_SIZE && size().max() > MAX_SIZE {
         let size = size();
         let [x, y, z] = [size.x, size.y, size.z].map(|side| format_number((1e3 * side).round() / 1e3));
@@ -128,15 +130,8 @@ fn check_asset(lua: &Lua, record: &Record, asset: &Table) -> mlua::Result<()> {
         );
         return Err(invalid(lua, record.label, "shape", message));
     }
-    let Friction { static_mu, dynamic_mu, .. } = FromChecked::from_checked(asset.raw_get("friction")?, lua)?;
-    if dynamic_mu <= static_mu {
-        // An episode can use only files that were found when the script was loaded.
-        return find_calibration(lua, &asset.raw_get::<String>("name")?);
-    }
-    let message = format!(
-        "asset.friction: dynamic_mu {dynamic_mu} is above static_mu {static_mu}; set both, the larger one as static_mu"
-    );
-    Err(fail(lua, message))
+    // An episode can use only files that were found when the script was loaded.
+    find_calibration(lua, &asset.raw_get::<String>("name")?)
 }
 
 impl AssetSpec {
@@ -166,7 +161,13 @@ functions! {
     FUNCTIONS {
         /// Returns the fingerprint of an asset: a hash of its shape, material and friction. Calibrations refer to it.
         fn fingerprint(lua, asset: Constructed<AssetSpec>) -> ["string"] { asset.asset(lua)?.fingerprint() }
-        /// Returns what is most likely a mistake in the material and the visuals of an asset, as softvt check tells it.
-        fn asset_warnings(lua, asset: Constructed<AssetSpec>) -> ["string[]"] { asset.asset(lua)?.warnings() }
+        /// Returns what is most likely a mistake in an asset, as softvt check tells it.
+        fn asset_warnings(lua, asset: Constructed<AssetSpec>) -> ["string[]"] {
+            let body = asset.body.table();
+            let record = BodySpec::RECORDS.iter().find(|record| is_constructed(lua, record, body));
+            let unusual = record.into_iter().flat_map(|record| record.unusual(body));
+            let unusual = unusual.map(|found| found.describe("body"));
+            unusual.chain(asset_warnings(&asset.asset(lua)?, &app_data::<AssetCache>(lua)?.approximate())).collect::<Vec<_>>()
+        }
     }
 }

@@ -9,7 +9,7 @@ use super::{
     pose::{direction, rotation_from_wxyz, unit_direction, wxyz},
 };
 use crate::{
-    schema::{Range, Type, choice, class, object::fixed_list, record},
+    schema::{Range, Type, choice, class, object::read_only_list, record},
     vm::error::{current_line, fail},
 };
 use softvt_common::parallel::lock;
@@ -17,14 +17,15 @@ use softvt_geometry::{Pose, Quat, Vec3};
 use softvt_scene::{Camera, CameraMount, Lighting, MAX_CAMERAS, Scene};
 
 /// Strengths and colours of lights, which may be brighter than white.
-const BRIGHTNESS: Range = Range::closed(0.0, 1000.0);
+const BRIGHTNESS: Range = Range::closed(0.0, 1000.0).usually(0.0, 50.0);
 const FIELD_OF_VIEW: Type = Type::Number("rad", Range::closed(0.01, 2.8));
 const NEAR: Type = Type::Number("m", Range::closed(1e-4, 100.0));
-const FAR: Type = Type::Number("m", Range::closed(1e-3, 1e4));
+const FAR: Type = Type::Number("m", Range::closed(1e-3, 1e4).usually(0.15, 1e3));
 /// Width or height of a camera's image.
 pub(crate) const IMAGE_EDGE: Type = Type::Integer(Range::closed(1.0, 4096.0));
 const LIGHT_COLOUR: Type = Type::colour(20.0);
-const POINT: Type = Type::Vector(3, "m, frame of the mount", Range::closed(-100.0, 100.0));
+const POINT: Type =
+    Type::Vector(3, "m, frame of the mount", Range::closed(-100.0, 100.0).usually(-10.0, 10.0));
 const ORIENTATION: Type = Type::Quaternion("frame of the mount");
 
 choice! { CameraMount { "world" => World, "hand" => Hand } }
@@ -100,7 +101,7 @@ class! {
             /// Factor on the sky.
             sky_strength: Type::Number("", BRIGHTNESS) => sky.strength;
             /// Factor on the whole image.
-            exposure: Type::Number("", Range { max: 1000.0, ..Range::POSITIVE }) => exposure;
+            exposure: Type::Number("", Range { max: 1000.0, ..Range::POSITIVE }.usually(0.01, 100.0)) => exposure;
         }
     }
 }
@@ -200,7 +201,7 @@ class! {
             quaternion: ORIENTATION => {
                 get(lua, this) {
                     let numbers = this.read(|camera| wxyz(&camera.pose.rotation));
-                    fixed_list(lua, numbers, "its numbers belong together: write camera.quaternion = { w, x, y, z }")?
+                    read_only_list(lua, numbers, "its numbers belong together: write camera.quaternion = { w, x, y, z }")?
                 }
                 set(lua, this, numbers: [f64; 4]) {
                     this.change(lua, |camera| camera.pose.rotation = rotation_from_wxyz(numbers).unwrap_or_default());

@@ -37,6 +37,7 @@ use softvt_evaluation::{
 };
 use softvt_geometry::Vec3;
 use softvt_robot::spec::PadSpec;
+use softvt_rollout::AssetCache;
 use softvt_scene::{Asset, HiddenProperties, LENGTH_HINT, ObjectVariation};
 
 /// Largest number of instances of a sample.
@@ -139,7 +140,7 @@ pub(crate) fn sample(
     asset: &Asset,
     count: u32,
 ) -> mlua::Result<Vec<Table>> {
-    let size = asset.shape.bounds().size();
+    let size = app_data::<AssetCache>(lua)?.bounds(&asset.shape).size();
     let state = |drawn: Option<&ObjectVariation>| instance_state(lua, &Instance { asset, size, drawn });
     let Some(ranges) = ranges else { return (0..count).map(|_| state(None)).collect() };
     let drawn = draw(lua, |presses_of| ranges.sample_instances(suite, asset, count, presses_of))?;

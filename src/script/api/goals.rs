@@ -8,11 +8,11 @@ use crate::{
         FromChecked, HasTable, LuaType, Range, Record, RecordType, Type, Unchecked, choice, functions,
         invalid, make, one_of, record,
     },
-    vm::{error::fail, source_map::fail_at_key},
+    vm::error::fail,
 };
 use softvt_benchmark::{
     Placement,
-    goal::{Goal, Parts, Side},
+    goal::{Goal, Side, SubGoals},
 };
 
 choice! {
@@ -61,7 +61,7 @@ record! {
     /// Each object rests on the one before it in the list, released, for a time.
     StackedSpec: "softvt.Stacked" as "task.goal", constructor "softvt.stacked" {
         /// Scene names, from the lowest object on; at least two.
-        objects: Vec<String>;
+        objects: Vec<String> = Type::Distinct { of: &Type::Text, by: "", min: 2 };
         /// Time that they must stay there.
         hold_s: f64 = HOLD => Number(0.4);
     }
@@ -84,7 +84,7 @@ record! {
         /// Part of an articulated object (stove.knob).
         joint: String;
         /// Lowest and highest value, rad of a hinge and m of a slider.
-        range: [f64; 2] = Type::Vector(2, "rad or m", ANGLES);
+        range: [f64; 2] = Type::Interval("rad or m", ANGLES);
     }
     /// The centres of two objects are near each other in the horizontal plane, and the robot does not touch the object,
     /// for a time.
@@ -290,11 +290,11 @@ impl GoalSpec {
         if depth > MAX_DEPTH {
             return Err(fail(lua, format!("task.goal: goals are nested more than {MAX_DEPTH} deep")));
         }
-        let mut parts = |goals: &[Table]| -> mlua::Result<Parts> {
+        let mut parts = |goals: &[Table]| -> mlua::Result<SubGoals> {
             let goal = |goal: &Table| {
                 Self::from_checked(Value::Table(goal.clone()), lua)?.convert(lua, depth + 1, predicates)
             };
-            Ok(Parts { goals: goals.iter().map(goal).collect::<mlua::Result<_>>()? })
+            Ok(SubGoals { goals: goals.iter().map(goal).collect::<mlua::Result<_>>()? })
         };
         match self {
             Self::All(spec) => return parts(&spec.goals).map(Goal::All),
@@ -314,21 +314,8 @@ impl GoalSpec {
             goal
         };
         if let Self::Stacked(spec) = self {
-            if spec.objects.len() < 2 {
-                let message =
-                    "task.goal.objects: expected at least two objects, from the lowest on".to_owned();
-                return Err(fail_at_key(lua, &table, "objects", message));
-            }
-            let is_twice = |at: &usize| spec.objects[..*at].contains(&spec.objects[*at]);
-            if let Some(twice) = (1..spec.objects.len()).find(is_twice) {
-                let message = format!(
-                    "task.goal.objects: names {:?} twice; give each object once",
-                    spec.objects[twice]
-                );
-                return Err(fail_at_key(lua, &table, "objects", message));
-            }
             let on = |pair: &[String]| declare(Goal::On(placement(&pair[1], &pair[0], spec.hold_s)));
-            return Ok(Goal::All(Parts { goals: spec.objects.windows(2).map(on).collect() }));
+            return Ok(Goal::All(SubGoals { goals: spec.objects.windows(2).map(on).collect() }));
         }
         Ok(declare(self.predicate()))
     }
@@ -355,7 +342,7 @@ impl GoalSpec {
             }
             Self::Predicate(goal) => Goal::Predicate { name: goal.name.clone() },
             Self::Stacked(_) | Self::All(_) | Self::Any(_) | Self::None(_) | Self::Sequence(_) => {
-                Goal::All(Parts { goals: Vec::new() })
+                Goal::All(SubGoals { goals: Vec::new() })
             }
         }
     }

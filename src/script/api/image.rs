@@ -44,19 +44,6 @@ impl LuaImage {
         Ok(Self(Arc::new(Mutex::new(ImageContent { image, _reserved: reserved }))))
     }
 
-    /// Makes an image after reserving its memory, and `scratch_bytes` while it is made.
-    fn make(
-        lua: &Lua,
-        width: u32,
-        height: u32,
-        scratch_bytes: usize,
-        make: impl FnOnce() -> RgbImage,
-    ) -> mlua::Result<Self> {
-        let reserved = reserve(lua, 3 * width as usize * height as usize)?;
-        let _scratch = reserve(lua, scratch_bytes)?;
-        Ok(Self(Arc::new(Mutex::new(ImageContent { image: make(), _reserved: reserved }))))
-    }
-
     fn paste(&self, other: &Self, x: f64, y: f64) {
         // An image pasted on itself is copied first: it cannot be read while it is written.
         let source = lock(&other.0).image.clone();
@@ -108,7 +95,7 @@ functions! {
             /// Colour.
             colour: [f64; 3] = SRGB;
         } -> ["softvt.Image"] {
-            LuaImage::make(lua, width, height, 0, || RgbImage::from_pixel(width, height, Rgb(srgb(colour))))?
+            LuaImage::new(lua, RgbImage::from_pixel(width, height, Rgb(srgb(colour))))?
         }
     }
 }
@@ -156,14 +143,11 @@ class! {
             fn crop(lua, this, region: [f64; 4] = REGION) -> ["softvt.Image"] {
                 let image = &lock(&this.0).image;
                 let ImageRegion { x, y, width, height } = part(lua, "crop", image, Some(region))?;
-                LuaImage::make(lua, width, height, 0, || imageops::crop_imm(image, x, y, width, height).to_image())?
+                LuaImage::new(lua, imageops::crop_imm(image, x, y, width, height).to_image())?
             }
             /// Returns the image in another size.
             fn resize(lua, this, width: u32 = EDGE, height: u32 = EDGE) -> ["softvt.Image"] {
-                let image = &lock(&this.0).image;
-                // The intermediate image is as wide as the new one and as tall as the old one.
-                let scratch_bytes = 3 * width as usize * image.height() as usize;
-                LuaImage::make(lua, width, height, scratch_bytes, || resize(image, width, height))?
+                LuaImage::new(lua, resize(&lock(&this.0).image, width, height))?
             }
             /// Copies another image onto this one, with its top left pixel at x, y.
             fn paste(_, this, other: LuaImage, x: f64 = Type::Number("pixels", OFFSET), y: f64 = Type::Number("pixels", OFFSET)) -> [] { this.paste(&other, x, y) }
@@ -183,8 +167,6 @@ class! {
                     return Err(fail(lua, message));
                 }
                 let image = &mut lock(&this.0).image;
-                // The canvas has four bytes per pixel, and its image three.
-                let _scratch = reserve(lua, 7 * image.width() as usize * image.height() as usize)?;
                 let mut canvas = Canvas::from_image(image);
                 canvas.write(&text, at[0] as f32, at[1] as f32, size, srgb(colour));
                 *image = canvas.to_image();

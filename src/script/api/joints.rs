@@ -4,46 +4,49 @@ use std::{collections::BTreeMap, sync::Arc};
 
 use mlua::{Lua, Table};
 
-use super::{pose::ANGLES, shapes::LuaShape, visuals::visuals_of};
+use super::{assets::DENSITY, pose::ANGLES, shapes::LuaShape, visuals::visuals_of};
 use crate::{
     schema::{
-        FromChecked, Range, Record, RecordType, Type, ValidationError, error_at_key, invalid, one_of, record,
+        FromChecked, LuaType, Range, Record, RecordType, Type, ValidationError, error_at_key, one_of, record,
     },
     vm::error::fail,
 };
-use softvt_common::text::{exact_number, format_number, unknown_name};
+use softvt_common::text::{format_number, unknown_name};
 use softvt_geometry::{Pose, Vec3};
 use softvt_physics::contact::Friction;
 use softvt_scene::{Asset, Body, Joint, JointMotion, MovingPart, Visual, part_poses};
 
+/// Value of a slider.
+const TRAVEL: Type = Type::Number("m", Range::ANY.usually(-2.0, 2.0));
+
 record! {
     /// A joint along which a part slides, such as that of a drawer. Values are in m.
-    SliderSpec: "softvt.Slider" as "slider", constructor "softvt.slider", relations check_limits {
+    SliderSpec: "softvt.Slider" as "slider", constructor "softvt.slider", relation Increasing(&["lower", "upper"]) {
         /// Direction in which its value grows.
         axis: [f64; 3] = Type::Direction(&[], "object frame");
         /// Lowest value.
-        lower: f64 = Type::Number("m", Range::ANY);
+        lower: f64 = TRAVEL;
         /// Highest value, above the lowest.
-        upper: f64 = Type::Number("m", Range::ANY);
+        upper: f64 = TRAVEL;
         /// Viscous damping.
-        damping: f64 = Type::Number("N s/m", Range::NOT_NEGATIVE) => Number(0.0);
+        damping: f64 = Type::Number("N s/m", Range::NOT_NEGATIVE.usually(0.0, 1000.0)) => Number(0.0);
         /// Dry friction.
-        friction: f64 = Type::Number("N", Range::NOT_NEGATIVE) => Number(0.0);
+        friction: f64 = Type::Number("N", Range::NOT_NEGATIVE.usually(0.0, 100.0)) => Number(0.0);
     }
     /// A joint about which a part turns, such as that of a door or a knob. Values are in rad.
-    HingeSpec: "softvt.Hinge" as "hinge", constructor "softvt.hinge", relations check_limits {
+    HingeSpec: "softvt.Hinge" as "hinge", constructor "softvt.hinge", relation Increasing(&["lower", "upper"]) {
         /// Axis about which its value grows, right-handed.
         axis: [f64; 3] = Type::Direction(&[], "object frame");
         /// A point of the axis, with all joints at 0.
-        origin: [f64; 3] = Type::vector(3, "m, object frame");
+        origin: [f64; 3] = Type::Vector(3, "m, object frame", Range::ANY.usually(-2.0, 2.0));
         /// Lowest value.
         lower: f64 = Type::Number("rad", ANGLES);
         /// Highest value, above the lowest.
         upper: f64 = Type::Number("rad", ANGLES);
         /// Viscous damping.
-        damping: f64 = Type::Number("N m s/rad", Range::NOT_NEGATIVE) => Number(0.0);
+        damping: f64 = Type::Number("N m s/rad", Range::NOT_NEGATIVE.usually(0.0, 30.0)) => Number(0.0);
         /// Dry friction.
-        friction: f64 = Type::Number("N m", Range::NOT_NEGATIVE) => Number(0.0);
+        friction: f64 = Type::Number("N m", Range::NOT_NEGATIVE.usually(0.0, 20.0)) => Number(0.0);
     }
     /// A part of an articulated object. Parts of one object never touch each other or its base.
     PartSpec: "softvt.Part" as "part" {
@@ -52,7 +55,7 @@ record! {
         /// Shape with all joints at 0, in the frame of the whole object. Walls must be at least 4 mm thick.
         shape: LuaShape;
         /// Density.
-        density: f64 = Type::Number("kg/m³", Range::POSITIVE);
+        density: f64 = DENSITY;
         /// Joint that carries it; axes and origins are in the frame of the whole object.
         joint: JointSpec;
         /// Name of the part that carries it; the fixed base by default.
@@ -63,9 +66,9 @@ record! {
         hints: BTreeMap<String, f64> => Empty;
     }
     /// Parts on joints. The asset's own shape is their base, which never moves.
-    ArticulatedSpec: "softvt.Articulated" as "articulated", constructor "softvt.articulated", relations check_parts {
+    ArticulatedSpec: "softvt.Articulated" as "articulated", constructor "softvt.articulated", relation Checked(check_parts) {
         /// The parts, in any order.
-        parts: Vec<PartSpec>;
+        parts: Vec<PartSpec> = Type::Distinct { of: PartSpec::REFERENCE, by: "name", min: 1 };
     }
 }
 
@@ -77,15 +80,6 @@ one_of! {
 pub(crate) static CONSTRUCTORS: &[&Record] =
     &[ArticulatedSpec::RECORD, SliderSpec::RECORD, HingeSpec::RECORD];
 
-fn check_limits(lua: &Lua, record: &Record, joint: &Table) -> mlua::Result<()> {
-    let (lower, upper): (f64, f64) = (joint.raw_get("lower")?, joint.raw_get("upper")?);
-    if lower < upper {
-        return Ok(());
-    }
-    let (lower, upper) = (exact_number(lower), exact_number(upper));
-    Err(invalid(lua, record.label, "upper", format!("expected more than lower, {lower}, got {upper}")))
-}
-
 fn check_parts(lua: &Lua, record: &Record, body: &Table) -> mlua::Result<()> {
     let parts = Vec::<PartSpec>::from_checked(body.raw_get("parts")?, lua)?;
     order(&parts).map(|_| ()).map_err(|error| error_at_key(lua, record.label, &error.inside("parts")))
@@ -94,13 +88,7 @@ fn check_parts(lua: &Lua, record: &Record, body: &Table) -> mlua::Result<()> {
 /// Sorts the parts so that each comes after the one that carries it, and returns their indices.
 fn order(parts: &[PartSpec]) -> Result<Vec<usize>, ValidationError> {
     let wrong = |message: String| Err(ValidationError::new(message));
-    if parts.is_empty() {
-        return wrong("expected at least one part; without any it is softvt.static {}".into());
-    }
     let names: Vec<&str> = parts.iter().map(|part| part.name.as_str()).collect();
-    if let Some(duplicate) = (1..names.len()).find(|&i| names[..i].contains(&names[i])) {
-        return wrong(format!("there are two parts named {:?}; names must be unique", names[duplicate]));
-    }
     let index_of = |parent: &String| names.iter().position(|name| name == parent);
     for PartSpec { name, parent, .. } in parts {
         if let Some(parent) = parent.as_ref().filter(|parent| index_of(parent).is_none()) {

@@ -7,9 +7,6 @@ use std::{
 };
 
 use image::{ImageReader, Limits};
-use mlua::Lua;
-
-use crate::vm::memory_budget::{Reservation, reserve};
 use softvt_common::{disk_cache::DiskCache, text::shortened};
 use softvt_geometry::{
     import::{ImportedColours, ImportedImage},
@@ -24,7 +21,8 @@ pub(crate) struct FileColours {
     mesh: ColouredMesh,
     roughness: Option<f64>,
     metalness: Option<f64>,
-    _reserved: Vec<Reservation>,
+    /// Memory of its images.
+    bytes: usize,
 }
 
 impl FileColours {
@@ -32,9 +30,8 @@ impl FileColours {
     /// the material of the largest area. `read` returns a file by its path from the folder of the mesh file.
     ///
     /// # Errors
-    /// An image of a triangle cannot be read, or does not fit into memory; the message names it.
+    /// An image of a triangle cannot be read, or the images are too large; the message names it.
     pub(crate) fn new(
-        lua: &Lua,
         imported: ImportedColours,
         solid: &Arc<MeshSolid>,
         read: &dyn Fn(&str) -> Result<Vec<u8>, String>,
@@ -49,7 +46,7 @@ impl FileColours {
         let by_area = areas.iter().rev().max_by(|a, b| a.1.total_cmp(b.1));
         let main = by_area.and_then(|(id, _)| materials.get(usize::from(*id)));
         let (roughness, metalness) = main.map_or((None, None), |main| (main.roughness, main.metalness));
-        let mut images = Images { lua, read, decoded: BTreeMap::new(), reserved: Vec::new() };
+        let mut images = Images { read, decoded: BTreeMap::new(), bytes: 0 };
         let materials = materials.iter().enumerate().map(|(id, material)| {
             let is_used = u16::try_from(id).is_ok_and(|id| areas.contains_key(&id));
             let image =
@@ -57,9 +54,14 @@ impl FileColours {
             Ok(MeshMaterial { albedo: material.albedo, image })
         });
         let materials: Arc<[MeshMaterial]> = materials.collect::<Result<Vec<_>, String>>()?.into();
-        let reserved = std::mem::take(&mut images.reserved);
+        let bytes = images.bytes;
         let mesh = ColouredMesh { solid: solid.clone(), material_ids, materials };
-        Ok(Some(Self { mesh, roughness, metalness, _reserved: reserved }))
+        Ok(Some(Self { mesh, roughness, metalness, bytes }))
+    }
+
+    /// Memory of its images, bytes.
+    pub(crate) fn bytes(&self) -> usize {
+        self.bytes
     }
 
     /// The visual of a shape that contains the meshes of `colours`.
@@ -129,6 +131,9 @@ pub(crate) fn path_beside(mesh_file: &str, name: &str) -> Result<String, String>
 /// scaled down.
 const KEPT_EDGE: u32 = 2048;
 
+/// Memory of the images of one mesh file, bytes.
+const MAX_IMAGE_BYTES: usize = 256 << 20;
+
 /// Memory for what an image has beside its pixels, bytes. A larger colour profile is ignored.
 const MAX_METADATA_BYTES: u64 = 8 << 20;
 
@@ -143,12 +148,11 @@ fn reader(bytes: &[u8], pixels: u64) -> io::Result<ImageReader<Cursor<&[u8]>>> {
 
 /// The images of a mesh file, each decoded once.
 struct Images<'a> {
-    lua: &'a Lua,
     read: &'a dyn Fn(&str) -> Result<Vec<u8>, String>,
     /// Those so far, by their path or the address of their bytes.
     decoded: BTreeMap<(&'a str, *const u8), Arc<SurfaceImage>>,
     /// Memory of those so far.
-    reserved: Vec<Reservation>,
+    bytes: usize,
 }
 
 impl<'a> Images<'a> {
@@ -180,13 +184,13 @@ impl<'a> Images<'a> {
         // Before it is decoded, which takes little more for one image at a time.
         let longest = width.max(height);
         let kept = |edge: u32| (edge * KEPT_EDGE).div_ceil(longest.max(KEPT_EDGE));
-        let reserved = reserve(self.lua, SurfaceImage::bytes(kept(width), kept(height)));
-        self.reserved.push(reserved.map_err(|_| {
-            format!(
-                "{name}: {width} × {height} pixels do not fit into the memory of images, shapes and masks; scale it \
-                 down or use fewer images"
-            )
-        })?);
+        self.bytes += SurfaceImage::bytes(kept(width), kept(height));
+        if self.bytes > MAX_IMAGE_BYTES {
+            let limit = MAX_IMAGE_BYTES >> 20;
+            return Err(format!(
+                "{name}: the images of the file take more than {limit} MiB; scale them down"
+            ));
+        }
         let pixels = u64::from(width) * u64::from(height);
         let decode = || -> Result<_, String> {
             Ok(reader(pixels)?.decode().map_err(|error| unreadable(&error))?.into_rgb8())
@@ -210,7 +214,6 @@ mod tests {
     };
 
     use super::*;
-    use crate::vm::memory_budget::MemoryUse;
     use softvt_geometry::{import::ImportedMaterial, mesh::Mesh};
 
     /// A tetrahedron, whose last face is the largest.
@@ -235,12 +238,6 @@ mod tests {
         ImportedMaterial { image, roughness: Some(roughness), ..ImportedMaterial::default() }
     }
 
-    fn lua() -> Lua {
-        let lua = Lua::new();
-        lua.set_app_data(MemoryUse::default());
-        lua
-    }
-
     #[test]
     fn a_colour_profile_is_unpacked_within_a_limit() {
         let profile = |size: usize| {
@@ -263,7 +260,7 @@ mod tests {
             requests.borrow_mut().push(path.to_owned());
             Ok(png(4))
         };
-        let colours = FileColours::new(&lua(), imported, &tetrahedron(), &read).expect("an image");
+        let colours = FileColours::new(imported, &tetrahedron(), &read).expect("an image");
         let FileColours { mesh, roughness, .. } = colours.expect("materials");
         assert_eq!(requests.into_inner(), ["a.png"]);
         let [None, Some(a), Some(b)] = [0, 1, 2].map(|id| mesh.materials[id].image.clone()) else {
@@ -279,7 +276,7 @@ mod tests {
             let read = move |_: &str| Ok(png(edge));
             let imported =
                 ImportedColours { materials: vec![textured("a.png", 0.5)], material_ids: vec![0; 4] };
-            let colours = FileColours::new(&lua(), imported, &tetrahedron(), &read).expect("an image");
+            let colours = FileColours::new(imported, &tetrahedron(), &read).expect("an image");
             format!("{:?}", colours.expect("materials").mesh.materials[0].image)
         };
         for (edge, kept) in [(KEPT_EDGE, KEPT_EDGE), (KEPT_EDGE + 1, KEPT_EDGE), (4096, KEPT_EDGE)] {
@@ -300,7 +297,7 @@ mod tests {
         };
         let read = |path: &str| Err(path.to_owned());
         let roughness = |ids: [u16; 4]| {
-            let colours = FileColours::new(&lua(), imported(ids.to_vec()), &tetrahedron(), &read);
+            let colours = FileColours::new(imported(ids.to_vec()), &tetrahedron(), &read);
             colours.expect("no image").expect("materials").roughness
         };
         assert_eq!(roughness([1, 1, 2, 2]), Some(0.3));
@@ -309,24 +306,15 @@ mod tests {
     }
 
     #[test]
-    fn memory_is_reserved_before_an_image_is_decoded() {
-        let lua = lua();
-        let rest = 1000;
-        let _others = reserve(&lua, (512 << 20) - rest).expect("it fits");
+    fn an_image_that_cannot_be_read_or_fit_is_refused() {
+        let one = ImportedColours { materials: vec![textured("a.png", 0.5)], material_ids: vec![0; 4] };
         // Its pixels are missing.
-        let cut: Vec<u8> = png(64).into_iter().take(60).collect();
-        let imported =
-            || ImportedColours { materials: vec![textured("a.png", 0.5)], material_ids: vec![0; 4] };
-        let error = |lua: &Lua| {
-            FileColours::new(lua, imported(), &tetrahedron(), &|_| Ok(cut.clone())).expect_err("refused")
-        };
-        assert!(
-            error(&lua).starts_with("a.png: 64 × 64 pixels do not fit into the memory"),
-            "{}",
-            error(&lua)
-        );
-        let empty = self::lua();
-        assert!(error(&empty).ends_with("give a PNG or JPEG file"), "{}", error(&empty));
+        let cut = |_: &str| Ok(png(64).into_iter().take(60).collect());
+        let error = FileColours::new(one, &tetrahedron(), &cut).expect_err("cut off");
+        assert!(error.starts_with("a.png: ") && error.ends_with("give a PNG or JPEG file"), "{error}");
+        let mut images = Images { read: &cut, decoded: BTreeMap::new(), bytes: MAX_IMAGE_BYTES - 1000 };
+        let error = images.decode("b.png", &png(64)).expect_err("full");
+        assert_eq!(error, "b.png: the images of the file take more than 256 MiB; scale them down");
     }
 
     #[test]

@@ -8,7 +8,6 @@ pub(crate) mod envelope_plot;
 pub(crate) mod experiment_input;
 pub(crate) mod expert;
 pub(crate) mod expert_input;
-pub(crate) mod expert_names;
 pub(crate) mod goals;
 pub(crate) mod image;
 pub(crate) mod joints;
@@ -19,6 +18,7 @@ pub(crate) mod policy;
 pub(crate) mod pose;
 pub(crate) mod random;
 pub(crate) mod scene;
+pub(crate) mod scene_names;
 pub(crate) mod shapes;
 pub(crate) mod simulation;
 pub(crate) mod tasks;
@@ -31,8 +31,8 @@ use mlua::{Lua, Table, Value};
 
 use super::{
     schema::{
-        ApiObject, Class, Function, Record, RecordType, Signature, Type, Unchecked, ValidationError,
-        check::error_of_caller, function::signature, functions, make,
+        ApiObject, Class, Function, Record, RecordType, Signature, Type, Unchecked, UnusualNumbers,
+        ValidationError, check::error_of_caller, function::signature, functions, make,
     },
     vm::{
         error::fail,
@@ -129,10 +129,10 @@ pub(crate) fn functions() -> impl Iterator<Item = &'static Function> {
         simulation::FUNCTIONS,
         envelope::FUNCTIONS,
         expert::FUNCTIONS,
-        expert_names::FUNCTIONS,
         image::FUNCTIONS,
         plots::FUNCTIONS,
         pose::FUNCTIONS,
+        scene_names::FUNCTIONS,
         shapes::FUNCTIONS,
     ]
     .into_iter()
@@ -207,6 +207,7 @@ pub(crate) fn install(lua: &Lua, api: &Table) -> mlua::Result<()> {
     }
     functions().try_for_each(|function| function.install(lua, api, "softvt."))?;
     lua.set_app_data(shapes::UnusedShapes::default());
+    lua.set_app_data(UnusualNumbers::default());
     let shapes = lua.create_table()?;
     shapes::SHAPES.iter().try_for_each(|function| function.install(lua, &shapes, "shape."))?;
     api.set("shape", shapes)?;

@@ -8,7 +8,7 @@ use super::image::LuaImage;
 use crate::{
     schema::{
         FieldValue, Range, Type, class,
-        object::{Access, IntoFieldValue, LuaField, MEASURED, fixed_list},
+        object::{Access, IntoFieldValue, LuaField, MEASURED, read_only_list},
         output,
     },
     vm::error::fail,
@@ -135,7 +135,7 @@ class! {
             tactile_history: "softvt.Fingers[]" {
                 get(lua, this) {
                     let frames = this.tactile(lua, "tactile_history")?.frames.iter().map(|frame| fingers(lua, frame));
-                    fixed_list(lua, frames.collect::<mlua::Result<Vec<_>>>()?, MEASURED)?
+                    read_only_list(lua, frames.collect::<mlua::Result<Vec<_>>>()?, MEASURED)?
                 }
             }
             /// True forces on the gels; requires observes.force.
@@ -230,12 +230,12 @@ class! {
         label(_) { "markers".to_owned() }
         fields {
             /// Positions on the untouched gel.
-            initial: "number[][]" { get(lua, this) { FieldValue::Fixed(positions(lua, &this.markers.initial)?, MEASURED) } }
+            initial: "number[][]" { get(lua, this) { FieldValue::ReadOnly(positions(lua, &this.markers.initial)?, MEASURED) } }
             /// Present positions.
-            present: "number[][]" { get(lua, this) { FieldValue::Fixed(positions(lua, &this.markers.current)?, MEASURED) } }
+            present: "number[][]" { get(lua, this) { FieldValue::ReadOnly(positions(lua, &this.markers.current)?, MEASURED) } }
             /// Displacements.
             motion: "number[][]" {
-                get(lua, this) { fixed_list(lua, this.flow.displacements.iter().map(|u| vec![u.x, u.y]), MEASURED)? }
+                get(lua, this) { read_only_list(lua, this.flow.displacements.iter().map(|u| vec![u.x, u.y]), MEASURED)? }
             }
         }
         methods {

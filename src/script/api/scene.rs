@@ -15,8 +15,8 @@ use super::{
     visuals::LuaMaterial,
 };
 use crate::{
-    schema::{Constructed, Range, Type, class, object::fixed_list, record},
-    vm::error::{author_line, fail},
+    schema::{Constructed, Range, Type, class, object::read_only_list, record},
+    vm::error::{app_data, author_line, fail},
 };
 use softvt_common::{
     parallel::lock,
@@ -26,6 +26,7 @@ use softvt_common::{
 use softvt_geometry::{Aabb, Pose, Quat, Vec3};
 use softvt_physics::{STANDARD_GRAVITY, contact::Friction, fem::ElasticMaterial};
 use softvt_robot::panda::{self, ARM_DOFS};
+use softvt_rollout::AssetCache;
 use softvt_scene::{Asset, Body, Camera, Lighting, MAX_OBJECTS, Object, Scene};
 
 /// Start pose of the arm as in SoftVTBench (from the released code): the hand above the table, pointing down.
@@ -35,14 +36,14 @@ const START_Q: [f64; ARM_DOFS] = [-0.01988, -0.18734, 0.00767, -2.40340, 0.00496
 const MAX_COORDINATE: f64 = 1e3;
 
 const POSITION: Type = Type::Vector(3, "m, world", COORDINATE);
-const COORDINATE: Range = Range::closed(-MAX_COORDINATE, MAX_COORDINATE);
+const COORDINATE: Range = Range::closed(-MAX_COORDINATE, MAX_COORDINATE).usually(-3.0, 3.0);
 /// Static coefficient of a coating.
 pub(crate) const COATING: Type = Type::Number("", Range::above(0.0, 10.0));
 /// Rotation about the vertical.
 pub(crate) const YAW: Type = Type::Number("rad", ANGLES);
 /// Uniform scales of objects.
 const SCALE: Type = Type::Number("", Range::closed(0.1, 10.0));
-const CORNER: Type = Type::vector(3, "m, world");
+const CORNER: Type = Type::Vector(3, "m, world", Range::ANY.usually(-5.0, 5.0));
 
 /// A scene without objects: robot base and workspace of the table scenes.
 pub(crate) fn empty_scene() -> Scene {
@@ -250,7 +251,7 @@ fn position(lua: &Lua, scene: &Scene, spec: &PlacementSpec) -> mlua::Result<Vec3
 
 /// Horizontal distance from a point to the nearest circle around the frame of an object that encloses the object, m.
 /// Scenery and surfaces at or below z = 0 do not count. Infinite in an empty scene.
-fn distance_to_objects(scene: &Scene, x: f64, y: f64) -> f64 {
+fn distance_to_objects(scene: &Scene, assets: &AssetCache, x: f64, y: f64) -> f64 {
     /// Height below which an object is a support, m.
     const SUPPORT: f64 = 1e-3;
     let distance = |object: &Object, bounds: &Aabb| {
@@ -266,7 +267,7 @@ fn distance_to_objects(scene: &Scene, x: f64, y: f64) -> f64 {
     for object in scene.objects.iter().filter(|object| !matches!(object.asset.body, Body::Scenery)) {
         // Tight bounds take a hundred times as long and are farther away.
         if distance(object, &object.asset.shape.loose_bounds()) < nearest {
-            nearest = nearest.min(distance(object, &object.asset.shape.bounds()));
+            nearest = nearest.min(distance(object, &assets.bounds(&object.asset.shape)));
         }
     }
     nearest
@@ -299,7 +300,7 @@ class! {
                 get(lua, this) {
                     let count = this.read(|scene| scene.objects.len());
                     let handles = (0..count).map(|index| LuaObject { scene: this.scene.clone(), index });
-                    fixed_list(lua, handles, "scene:add{…} adds an object")?
+                    read_only_list(lua, handles, "scene:add{…} adds an object")?
                 }
             }
             /// The object of the task's goal, in shifts; nil in layouts, which several tasks may share.
@@ -342,8 +343,9 @@ class! {
             }
             /// Returns the horizontal distance from a point to the nearest object, taken as an upright cylinder about
             /// its origin, m; negative inside of one. Surfaces at or below z = 0 and scenery do not count.
-            fn distance_to_objects(_, this, x: f64, y: f64) -> ["number"] {
-                this.read(|scene| distance_to_objects(scene, x, y))
+            fn distance_to_objects(lua, this, x: f64, y: f64) -> ["number"] {
+                let assets = app_data::<AssetCache>(lua)?;
+                this.read(|scene| distance_to_objects(scene, &assets, x, y))
             }
             /// Returns a camera by name; every scene has third_person and wrist.
             fn camera(lua, this, name: String) -> ["softvt.Camera"] { LuaCamera::named(lua, &this.scene, &name)? }
@@ -427,7 +429,7 @@ class! {
             materials: "softvt.Material[]" {
                 get(lua, this) {
                     let hint = "write the numbers of a material, as in materials[1].roughness = 0.5";
-                    fixed_list(lua, LuaMaterial::all(&this.scene, this.index), hint)?
+                    read_only_list(lua, LuaMaterial::all(&this.scene, this.index), hint)?
                 }
             }
             /// Start values of its joints by part, m or rad.

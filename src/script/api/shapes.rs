@@ -23,20 +23,20 @@ use crate::{
         memory_budget::{Reservation, reserve},
     },
 };
-use softvt_common::{
-    parallel::lock,
-    text::{AXIS_NAMES, format_number},
-};
+use softvt_common::{parallel::lock, text::format_number};
 use softvt_geometry::{
     Aabb, Quat, Vec3,
     import::{MeshFormat, MeshImportError, MeshImportOptions, import, import_colours},
     mass::mass_properties,
     shape::{Axis, Bumps, Ramp, Ridges, Shape, ShapeError, ShapeTreeSize, SurfaceRelief},
 };
+use softvt_rollout::AssetCache;
 use softvt_scene::Visual;
 
-const LENGTH: Type = Type::Number("m", Range::POSITIVE);
-const METRES: Type = Type::Number("m", Range::ANY);
+const LENGTH: Type = Type::Number("m", Range::POSITIVE.usually(1e-6, 20.0));
+const METRES: Type = Type::Number("m", Range::ANY.usually(-5.0, 5.0));
+/// Height of a relief.
+const RELIEF: Type = Type::Number("m", Range::ANY.usually(-0.1, 0.1));
 const POINT: Type = Type::vector(3, "m");
 const CORNERS: Type = Type::List(&Type::vector(2, "m"));
 
@@ -54,8 +54,10 @@ record_of! {
     }
 }
 
-/// Largest tree of a shape: every evaluation of its distance visits all of it.
-const MAX_TREE: ShapeTreeSize = ShapeTreeSize { nodes: 2000, depth: 100, work: 1e5 };
+/// Largest number of nodes, depth and work of the tree of a shape: every evaluation of its distance visits all of it.
+const MAX_NODES: usize = 2000;
+const MAX_DEPTH: usize = 100;
+const MAX_WORK: f64 = 1e5;
 
 /// `softvt.Shape`.
 #[derive(Clone, Debug)]
@@ -66,8 +68,6 @@ struct Node {
     shape: Shape,
     /// Colours of the mesh files in it, or why they cannot be read.
     colours: Result<Vec<Arc<FileColours>>, String>,
-    /// Memory it keeps, bytes; parts shared with other shapes count for each of them.
-    bytes: usize,
     use_mark: UseMark,
     _reserved: Reservation,
 }
@@ -112,23 +112,6 @@ impl Drop for UseMark {
     }
 }
 
-/// Greatest height of ridges, in distances between them: the sides of higher ones are too steep for contact and meshes.
-const MAX_RIDGE_ASPECT: f64 = 3.0;
-
-/// Checks the height of ridges at a distance `pitch`, m.
-fn check_ridges(lua: &Lua, height: f64, pitch: f64) -> mlua::Result<()> {
-    if height.abs() <= MAX_RIDGE_ASPECT * pitch {
-        return Ok(());
-    }
-    let message = format!(
-        "shape:ridges: ridges of {} m at a distance of {} m are too steep; make them at most {MAX_RIDGE_ASPECT} times as high as their \
-         distance (lengths are in metres)",
-        format_number(height.abs()),
-        format_number(pitch)
-    );
-    Err(fail(lua, message))
-}
-
 impl LuaShape {
     /// Line of the script that made it.
     pub(crate) fn made_at(&self) -> Option<&SourceLine> {
@@ -148,41 +131,36 @@ impl LuaShape {
         &self.0.shape
     }
 
-    /// Memory it keeps, bytes.
+    /// Memory of its tree, bytes.
     pub(crate) fn bytes(&self) -> usize {
-        self.0.bytes
+        self.0.shape.tree_size().bytes
     }
 
-    /// Checks a shape that keeps `extra_bytes` in addition to its tree.
-    fn new(lua: &Lua, shape: Shape, extra_bytes: usize) -> mlua::Result<Self> {
-        Self::coloured(lua, shape, extra_bytes, Ok(Vec::new()))
-    }
-
-    fn coloured(
-        lua: &Lua,
-        shape: Shape,
-        extra_bytes: usize,
-        colours: Result<Vec<Arc<FileColours>>, String>,
-    ) -> mlua::Result<Self> {
-        let ShapeTreeSize { nodes, depth, work } = shape.tree_size();
-        if work > MAX_TREE.work {
+    /// Checks a shape. Memory that it shares with others counts for each of them.
+    fn new(lua: &Lua, shape: Shape, colours: Result<Vec<Arc<FileColours>>, String>) -> mlua::Result<Self> {
+        let ShapeTreeSize { nodes, bytes, depth, work } = shape.tree_size();
+        if work > MAX_WORK {
             let message = "shape: cuts or unions are nested too deeply to be evaluated; join the parts by union first \
                            (a:union(b):union(c)), then cut or join them at once";
             return Err(fail(lua, message));
         }
-        if nodes > MAX_TREE.nodes || depth > MAX_TREE.depth {
+        if nodes > MAX_NODES || depth > MAX_DEPTH {
             return Err(fail(
                 lua,
                 format!(
-                    "shape: is made of {nodes} shapes, {depth} deep; at most {} and {} can be evaluated; use fewer, or a mesh",
-                    MAX_TREE.nodes, MAX_TREE.depth
+                    "shape: is made of {nodes} shapes, {depth} deep; at most {MAX_NODES} and {MAX_DEPTH} can be evaluated; use \
+                     fewer, or a mesh"
                 ),
             ));
         }
         shape.validate().map_err(|error| fail(lua, format!("shape.{error}")))?;
-        let bytes = nodes * size_of::<Shape>() + extra_bytes;
+        let bytes = bytes + colours.iter().flatten().map(|colours| colours.bytes()).sum::<usize>();
         let use_mark = UseMark::new(lua)?;
-        Ok(Self(Arc::new(Node { shape, colours, bytes, use_mark, _reserved: reserve(lua, bytes)? })))
+        Ok(Self(Arc::new(Node { shape, colours, use_mark, _reserved: reserve(lua, bytes)? })))
+    }
+
+    fn bounds(&self, lua: &Lua) -> mlua::Result<Aabb> {
+        Ok(app_data::<AssetCache>(lua)?.bounds(self.shape()))
     }
 
     /// A copy of its tree.
@@ -202,31 +180,14 @@ impl LuaShape {
         Err(fail(lua, message))
     }
 
-    /// Checks that a cut, of which the edge is rounded by `blend`, may remove something.
-    fn check_cut(&self, lua: &Lua, cut: &Self, blend: f64) -> mlua::Result<()> {
-        if self.shape().loose_bounds().loosened(blend).intersects(&cut.shape().loose_bounds()) {
+    /// Refuses an operation with another shape that is more than `reach` (m) away, and so changes nothing.
+    fn refuse_apart(&self, lua: &Lua, method: &str, other: &Self, reach: f64) -> mlua::Result<()> {
+        if self.shape().loose_bounds().loosened(reach).intersects(&other.shape().loose_bounds()) {
             return Ok(());
         }
-        let message = "shape:subtract: the other shape lies outside of this one, so that nothing is removed; lengths are in metres";
-        Err(fail(lua, message.to_owned()))
-    }
-
-    /// Checks that a mask leaves some of the relief that `method` adds.
-    fn check_mask(&self, lua: &Lua, method: &str, mask: Option<&Ramp>) -> mlua::Result<()> {
-        let Some(Ramp { axis, from, to }) = mask else { return Ok(()) };
-        let bounds = self.shape().loose_bounds();
-        let (low, high) = (bounds.min[axis.index()], bounds.max[axis.index()]);
-        let has_weight = if to > from { high > *from } else { low < *from };
-        if has_weight {
-            return Ok(());
-        }
-        let message = format!(
-            "shape:{method}.mask: its weight is 0 on the whole shape, which reaches from {} to {} m along {}",
-            format_number(low),
-            format_number(high),
-            AXIS_NAMES[axis.index()]
-        );
-        Err(fail(lua, message))
+        let message =
+            "the other shape lies outside of this one, so that nothing changes; lengths are in metres";
+        Err(fail(lua, format!("shape:{method}: {message}")))
     }
 
     /// Checks that a bent shape does not reach the centre of its arc, or its own other end.
@@ -237,7 +198,7 @@ impl LuaShape {
             let reach = (bounds.min[k] * curvature).max(bounds.max[k] * curvature);
             reach > 1.0 + ROUNDING || bounds.size()[i] * curvature.abs() > TAU * (1.0 + ROUNDING)
         };
-        if !overlaps(self.shape().loose_bounds()) || !overlaps(self.shape().bounds()) {
+        if !overlaps(self.shape().loose_bounds()) || !overlaps(self.bounds(lua)?) {
             return Ok(());
         }
         let message = format!(
@@ -250,25 +211,16 @@ impl LuaShape {
 
     /// A shape made of this one and `others`.
     fn derived(&self, lua: &Lua, shape: Shape, others: &[&Self]) -> mlua::Result<Self> {
-        let own = |shape: &Self| shape.0.bytes - shape.0.shape.tree_size().nodes * size_of::<Shape>();
-        let extra_bytes = others.iter().map(|other| own(other)).sum::<usize>() + own(self);
         let parts = std::iter::once(self).chain(others.iter().copied());
         let colours = parts.map(|part| part.0.colours.clone()).collect::<Result<Vec<_>, String>>();
-        Self::coloured(lua, shape, extra_bytes, colours.map(|all| all.concat()))
+        Self::new(lua, shape, colours.map(|all| all.concat()))
     }
 }
 
-/// Memory of a profile's corner with its edge.
-const BYTES_PER_CORNER: usize = 128;
-/// Memory of a mesh shape, in bytes per byte of its file.
-const MESH_BYTES_PER_FILE_BYTE: usize = 8;
-/// Memory of a mesh shape per triangle.
-const BYTES_PER_TRIANGLE: usize = 400;
-
-/// Makes a shape with `corners` of a profile.
-fn build(lua: &Lua, shape: Result<Shape, ShapeError>, corners: usize) -> mlua::Result<LuaShape> {
+/// Makes a shape that is not made of others.
+fn build(lua: &Lua, shape: Result<Shape, ShapeError>) -> mlua::Result<LuaShape> {
     let shape = shape.map_err(|error| fail(lua, format!("shape.{error}")))?;
-    LuaShape::new(lua, shape, corners * BYTES_PER_CORNER)
+    LuaShape::new(lua, shape, Ok(Vec::new()))
 }
 
 functions! {
@@ -277,17 +229,17 @@ functions! {
         fn box(lua) takes spec "softvt.BoxSpec" {
             /// Edge lengths.
             size: [f64; 3] = POINT;
-        } -> ["softvt.Shape"] { build(lua, Ok(Shape::cuboid(size.into())), 0)? }
+        } -> ["softvt.Shape"] { build(lua, Ok(Shape::cuboid(size.into())))? }
         /// A sphere centred on the origin.
         fn sphere(lua) takes spec "softvt.SphereSpec" {
             /// Radius.
             radius: f64 = LENGTH;
-        } -> ["softvt.Shape"] { build(lua, Ok(Shape::Sphere { radius }), 0)? }
+        } -> ["softvt.Shape"] { build(lua, Ok(Shape::Sphere { radius }))? }
         /// An ellipsoid centred on the origin.
         fn ellipsoid(lua) takes spec "softvt.EllipsoidSpec" {
             /// Diameters along x, y and z.
             size: [f64; 3] = POINT;
-        } -> ["softvt.Shape"] { build(lua, Ok(Shape::Ellipsoid { radii: 0.5 * Vec3::from(size) }), 0)? }
+        } -> ["softvt.Shape"] { build(lua, Ok(Shape::Ellipsoid { radii: 0.5 * Vec3::from(size) }))? }
         /// A capsule along the z axis, centred on the origin.
         fn capsule(lua) takes spec "softvt.CapsuleSpec" {
             /// Radius.
@@ -295,7 +247,7 @@ functions! {
             /// Total length including the caps; at least twice the radius.
             length: f64 = LENGTH;
         } -> ["softvt.Shape"] {
-            build(lua, Ok(Shape::Capsule { radius, half_length: 0.5 * length - radius }), 0)?
+            build(lua, Ok(Shape::Capsule { radius, half_length: 0.5 * length - radius }))?
         }
         /// A cylinder along the z axis, centred on the origin.
         fn cylinder(lua) takes spec "softvt.CylinderSpec" {
@@ -303,39 +255,33 @@ functions! {
             radius: f64 = LENGTH;
             /// Height.
             height: f64 = LENGTH;
-        } -> ["softvt.Shape"] { build(lua, Ok(Shape::Cylinder { radius, half_height: 0.5 * height }), 0)? }
+        } -> ["softvt.Shape"] { build(lua, Ok(Shape::Cylinder { radius, half_height: 0.5 * height }))? }
         /// A torus about the z axis, centred on the origin.
         fn torus(lua) takes spec "softvt.TorusSpec" {
             /// Radius of the centre line of the tube.
             major: f64 = LENGTH;
             /// Radius of the tube, less than major.
             minor: f64 = LENGTH;
-        } -> ["softvt.Shape"] { build(lua, Ok(Shape::Torus { major, minor }), 0)? }
+        } -> ["softvt.Shape"] { build(lua, Ok(Shape::Torus { major, minor }))? }
         /// A triangular prism along y in a box centred on the origin.
         fn wedge(lua) takes spec "softvt.WedgeSpec" {
             /// Edge lengths of the box.
             size: [f64; 3] = POINT;
             /// Position of the top edge across the width: -1 and 1 are the sides, 0 the middle.
             apex: f64 = Type::Number("", Range::closed(-1.0, 1.0)) => Number(0.0);
-        } -> ["softvt.Shape"] { build(lua, Shape::wedge(size.into(), apex), 0)? }
+        } -> ["softvt.Shape"] { build(lua, Shape::wedge(size.into(), apex))? }
         /// A polygon in (x, z), extruded along y and centred on y = 0.
         fn prism(lua) takes spec "softvt.PrismSpec" {
             /// Corners (x, z) in order.
             corners: Vec<[f64; 2]> = CORNERS;
             /// Length along y.
             length: f64 = LENGTH;
-        } -> ["softvt.Shape"] {
-            let count = corners.len();
-            build(lua, Shape::prism(corners, length), count)?
-        }
+        } -> ["softvt.Shape"] { build(lua, Shape::prism(corners, length))? }
         /// A profile revolved about the z axis.
         fn lathe(lua) takes spec "softvt.LatheSpec" {
             /// Corners (r, z) in order, with r ≥ 0.
             corners: Vec<[f64; 2]> = CORNERS;
-        } -> ["softvt.Shape"] {
-            let count = corners.len();
-            build(lua, Shape::lathe(corners), count)?
-        }
+        } -> ["softvt.Shape"] { build(lua, Shape::lathe(corners))? }
     }
 }
 
@@ -358,16 +304,11 @@ functions! {
             let library = app_data::<SharedLibrary>(lua)?;
             let found = lock(&library).data(&file, requester.as_deref());
             let bytes = found.map_err(|error| fail(lua, format!("softvt.mesh.file: {error}")))?.bytes;
-            // Fails before the mesh is built if it would not fit.
-            drop(reserve(lua, MESH_BYTES_PER_FILE_BYTE * bytes.len())?);
             let extension = file.rsplit_once('.').map_or("", |(_, extension)| extension);
             let refused = |error: MeshImportError| fail(lua, format!("softvt.mesh: {file}: {error}"));
             let mesh = MeshFormat::from_extension(extension)
                 .and_then(|format| import(&bytes, format, &MeshImportOptions { scale, z_up }))
                 .map_err(refused)?;
-            // A glTF mesh may occur in many nodes, so its size does not follow from that of the file.
-            let needed = (MESH_BYTES_PER_FILE_BYTE * bytes.len()).max(BYTES_PER_TRIANGLE * mesh.triangles.len());
-            drop(reserve(lua, needed)?);
             let shape = Shape::from_mesh(mesh).map_err(|error| refused(error.into()))?;
             let beside = |name: &str| {
                 let found = lock(&library).data(&path_beside(&file, name)?, requester.as_deref());
@@ -380,12 +321,12 @@ functions! {
                 Shape::Mesh(solid) => MeshFormat::from_extension(extension)
                     .map_err(|error| error.to_string())
                     .and_then(|format| import_colours(&bytes, format, &beside))
-                    .and_then(|colours| FileColours::new(lua, colours, solid, &beside))
+                    .and_then(|colours| FileColours::new(colours, solid, &beside))
                     .map(|colours| colours.map(Arc::new).into_iter().collect())
                     .map_err(|error| format!("{file}: {error}")),
                 _ => Ok(Vec::new()),
             };
-            LuaShape::coloured(lua, shape, needed, colours)?
+            LuaShape::new(lua, shape, colours)?
         }
     }
 }
@@ -427,7 +368,7 @@ class! {
             }
             /// Cuts another shape out of this one; blend (m) rounds the edge.
             fn subtract(lua, this, cut: LuaShape, blend: Option<f64> = METRES) -> ["softvt.Shape"] {
-                this.check_cut(lua, &cut, blend.unwrap_or(0.0))?;
+                this.refuse_apart(lua, "subtract", &cut, blend.unwrap_or(0.0))?;
                 let shape = match blend {
                     None => this.copy().subtract(cut.copy()),
                     Some(blend) => this.copy().smooth_subtract(cut.copy(), blend),
@@ -440,7 +381,7 @@ class! {
             }
             /// Returns the lowest and the highest corner of the bounding box, m.
             fn bounds(lua, this) -> ["number[]", "number[]"] {
-                let bounds = this.shape().bounds();
+                let bounds = this.bounds(lua)?;
                 let list = |corner: Vec3| lua.create_sequence_from([corner.x, corner.y, corner.z]);
                 (list(bounds.min)?, list(bounds.max)?)
             }
@@ -448,7 +389,7 @@ class! {
             fn volume(_, this) -> ["number"] { mass_properties(this.shape(), 1.0).mass }
             /// Moves the shape so that its lowest point is at z = 0 and its centre on the z axis, as assets require.
             fn grounded(lua, this) -> ["softvt.Shape"] {
-                let bounds = this.shape().bounds();
+                let bounds = this.bounds(lua)?;
                 let centre = bounds.centre();
                 let offset = Vec3::new(-centre.x, -centre.y, -bounds.min.z);
                 this.derived(lua, this.copy().translated(offset), &[])?
@@ -487,7 +428,7 @@ class! {
                 /// The axis that the ridges run around or along.
                 axis: Axis => Text("z");
                 /// Height from valley to crest; negative for grooves.
-                height: f64 = METRES;
+                height: f64 = RELIEF;
                 /// Number of ridges around the axis.
                 count: i32 = Type::Integer(Range::closed(-1000.0, 1000.0)) => Integer(0);
                 /// Distance of ridges along the axis; infinite for flutes.
@@ -504,15 +445,13 @@ class! {
                 if count == 0 && pitch.is_infinite() && radial_pitch.is_infinite() {
                     return Err(fail(lua, "shape:ridges: without a count, pitch or radial_pitch it adds nothing; give one".to_owned()));
                 }
-                this.check_mask(lua, "ridges", mask.as_ref())?;
-                check_ridges(lua, height, pitch.min(radial_pitch))?;
                 let ridges = Ridges { axis, height, count, pitch, radial_pitch, phase, sharpness, mask };
                 this.derived(lua, this.copy().displaced(SurfaceRelief::Ridges(ridges)), &[])?
             }
             /// Adds scattered bumps to a shape (seeds, raisins).
             fn bumps(lua, this) takes spec "softvt.BumpsSpec" {
                 /// Height; negative for pits.
-                height: f64 = METRES;
+                height: f64 = RELIEF;
                 /// Radius of a bump, at most half the spacing.
                 radius: f64 = LENGTH;
                 /// Mean distance of bumps.
@@ -522,7 +461,6 @@ class! {
                 /// Weight of their height; 1 everywhere by default.
                 mask: Option<Ramp>;
             } -> ["softvt.Shape"] {
-                this.check_mask(lua, "bumps", mask.as_ref())?;
                 let bumps = Bumps { height, radius, spacing, seed, mask };
                 this.derived(lua, this.copy().displaced(SurfaceRelief::Bumps(bumps)), &[])?
             }
@@ -533,11 +471,8 @@ class! {
                 /// Part of the surface inside of this shape; the whole surface by default.
                 region: Option<LuaShape>;
             } -> ["softvt.Shape"] {
-                if let Some(region) = &region
-                    && !this.shape().loose_bounds().intersects(&region.shape().loose_bounds())
-                {
-                    let message = "shape:paint: the region lies outside of the shape, so that nothing is painted; lengths are in metres";
-                    return Err(fail(lua, message));
+                if let Some(region) = &region {
+                    this.refuse_apart(lua, "paint", region, 0.0)?;
                 }
                 let shape = this.copy().painted(material, region.as_ref().map(LuaShape::copy));
                 this.derived(lua, shape, &Vec::from_iter(&region))?

@@ -39,7 +39,7 @@ use softvt_evaluation::deformation::{Deformation, ReferenceShape};
 use softvt_geometry::{Pose, Vec3};
 use softvt_physics::BodyId;
 use softvt_robot::{Side, gripper::GripTarget, rotation};
-use softvt_rollout::{ArmCommand, AssetCache, SensingError, SensorAssets, SensorSeed, Sensors, Simulation};
+use softvt_rollout::{ArmCommand, AssetCache, SensingError, SensorSeed, Sensors, Simulation};
 use softvt_sensing::tactile::{MarkerStyle, PadWrench, TactileReading};
 
 const EPISODE: Type = Type::Integer(Range::closed(0.0, 1e9));
@@ -119,13 +119,6 @@ pub(crate) struct SimulationState {
     _reserved: Reservation,
 }
 
-/// Results that the simulations of one virtual machine share.
-#[derive(Default)]
-struct Caches {
-    assets: AssetCache,
-    sensors: SensorAssets,
-}
-
 impl LuaSimulation {
     /// Builds the scene of a layout and lets it settle.
     fn new(lua: &Lua, layout: &LayoutSpec, seed: EpisodeSeed, settings: &Settings) -> mlua::Result<Self> {
@@ -137,11 +130,8 @@ impl LuaSimulation {
         let scene = Arc::new(scene);
         let clock = app_data::<Clock>(lua)?;
         let _pause = clock.pause();
-        if lua.app_data_ref::<Caches>().is_none() {
-            lua.set_app_data(Caches::default());
-        }
-        let caches = lua.app_data_ref::<Caches>().ok_or_else(|| mlua::Error::runtime("no caches"))?;
-        let mut sim = Simulation::new(scene, &settings.physics, &settings.robot, &caches.assets)
+        let assets = app_data::<AssetCache>(lua)?;
+        let mut sim = Simulation::new(scene, &settings.physics, &settings.robot, &assets)
             .map_err(|e| fail(lua, format!("softvt.simulate: {e}")))?;
         let soft_bytes: usize = sim.world.soft_bodies().iter().map(|soft| soft.state.model.bytes()).sum();
         let reserved = reserve_in_world(lua, BYTES_PER_SIMULATION + soft_bytes)?;
@@ -166,7 +156,7 @@ impl LuaSimulation {
             physics_steps: 0,
             failed: None,
             clock: clock.clone(),
-            sensors: Sensors::new(&sim, &settings.tactile, &caches.sensors).with_seed(sensor_seed),
+            sensors: Sensors::new(&sim, &settings.tactile, &assets).with_seed(sensor_seed),
             sim,
             _reserved: reserved,
         }))))

@@ -7,8 +7,8 @@ use mlua::{Function, Lua, Table, Value};
 use super::goals::GoalSpec;
 use crate::{
     schema::{
-        Constructed, FromChecked, Range, Record, RecordType, Type, Unchecked, ValidationError, choice,
-        error_at_key, functions, make, record,
+        Constructed, FromChecked, LuaType, Range, Record, RecordType, Type, Unchecked, ValidationError,
+        choice, error_at_key, functions, make, record,
     },
     vm::{error::fail, source_map::fail_at_key, value::describe},
 };
@@ -26,9 +26,9 @@ const EPISODE_PROMPT: Type = Type::Function("fun(scene: softvt.Scene, rng: softv
 /// Type of a task's expert.
 pub(crate) const EXPERT: Type = Type::Function("fun(arm: softvt.Arm, scene: softvt.SceneState)");
 /// Smallest and largest factor.
-const FACTORS: Type = Type::Vector(2, "", Range::closed(0.1, 10.0));
+const FACTORS: Type = Type::Interval("", Range::closed(0.1, 10.0));
 /// Smallest and largest static coefficient of a coating.
-const COATINGS: Type = Type::Vector(2, "", Range::above(0.0, 10.0));
+const COATINGS: Type = Type::Interval("", Range::above(0.0, 10.0));
 /// Type of a table of settings.
 pub(crate) const SETTINGS: Type = Type::Map(&Type::Map(&Type::Any));
 /// Class of the settings in the editor stubs, which list them group by group.
@@ -66,10 +66,10 @@ record! {
         expert: Option<Function> = EXPERT;
         /// Control steps (20 Hz) that the policy has; by default 500 in suites that vary layouts, 700 in those that
         /// vary objects.
-        budget_steps: Option<u32> = Type::Integer(Range::closed(1.0, 100_000.0));
+        budget_steps: Option<u32> = Type::Integer(Range::closed(1.0, 100_000.0).usually(10.0, 20_000.0));
     }
     /// A change of the scene that a run can request with --shift name=value. Limits of D stay those of the assets.
-    ShiftSpec: "softvt.Shift" as "shift", constructor "softvt.shift", relations check_shift_range {
+    ShiftSpec: "softvt.Shift" as "shift", constructor "softvt.shift", relation NotDecreasing(&["min", "default", "max"]) {
         /// Name on the command line.
         name: String;
         /// Unit of the value.
@@ -88,7 +88,7 @@ record! {
     /// Ranges from which every episode of a suite draws: factors on size, stiffness, density and friction of each soft
     /// object, its colour, the light and the poses of the cameras. The policy sees none of the drawn numbers; records
     /// do.
-    VariationSpec: "softvt.Variation" as "variation", constructor "softvt.variation", relations check_variation {
+    VariationSpec: "softvt.Variation" as "variation", constructor "softvt.variation" {
         /// Name in results.
         name: String = Type::Name;
         /// Smallest and largest factor on the size of a soft object, uniform.
@@ -126,10 +126,10 @@ record! {
         /// touches.
         coating: [f64; 2] = COATINGS;
         /// Largest over smallest safe grip force of the instances that are kept, at least 1.
-        window_ratio: [f64; 2] = Type::Vector(2, "", Range::closed(1.0, 1000.0));
+        window_ratio: [f64; 2] = Type::Interval("", Range::closed(1.0, 1000.0));
     }
     /// A number of each episode, beside the verdict: of the true state, which policies do not see.
-    MetricSpec: "softvt.Metric" as "metric", constructor "softvt.metric", relations check_metric {
+    MetricSpec: "softvt.Metric" as "metric", constructor "softvt.metric", relation Checked(check_metric) {
         /// Name in records and tables, with its unit, as tilt_deg; none that records have already, as safety.
         name: String = Type::Name;
         /// Returns the value after a control step, or nil where it has none. `step` is a row of the trace
@@ -152,11 +152,13 @@ record! {
         /// Default number of episodes per task.
         episodes: u32 = Type::Integer(Range::closed(1.0, 1e6)) => Integer(5);
         /// The tasks, in order.
-        tasks: Vec<Constructed<TaskSpec>>;
+        tasks: Vec<Constructed<TaskSpec>> = Type::Distinct { of: Constructed::<TaskSpec>::REFERENCE, by: "", min: 1 };
         /// Changes of the scene that a run can request.
-        shifts: Vec<Constructed<ShiftSpec>> => Empty;
+        shifts: Vec<Constructed<ShiftSpec>>
+            = Type::Distinct { of: Constructed::<ShiftSpec>::REFERENCE, by: "name", min: 0 } => Empty;
         /// Numbers of each episode that records and tables show beside the verdict.
-        metrics: Vec<Constructed<MetricSpec>> => Empty;
+        metrics: Vec<Constructed<MetricSpec>>
+            = Type::Distinct { of: Constructed::<MetricSpec>::REFERENCE, by: "name", min: 0 } => Empty;
         /// Ranges from which the soft objects, the light and the cameras of every episode are drawn.
         vary: Option<Constructed<VariationSpec>>;
         /// Changed settings (docs/settings.md): { physics = {…}, robot = {…}, criteria = {…}, tactile = {…}, cameras =
@@ -186,13 +188,13 @@ record! {
         rigid_twin: bool => Boolean(false);
     }
     /// Runs suites as they are, then under each condition, and compares them episode by episode.
-    ConditionsSpec: "softvt.Conditions" as "conditions", constructor "softvt.conditions", relations check_conditions {
+    ConditionsSpec: "softvt.Conditions" as "conditions", constructor "softvt.conditions", relation Checked(check_conditions) {
         /// Name in results.
         name: String = Type::Name;
         /// The suites, in order.
-        suites: Vec<Constructed<SuiteSpec>>;
+        suites: Vec<Constructed<SuiteSpec>> = Type::Distinct { of: Constructed::<SuiteSpec>::REFERENCE, by: "", min: 1 };
         /// The conditions, in order.
-        conditions: Vec<ConditionSpec>;
+        conditions: Vec<ConditionSpec> = Type::Distinct { of: ConditionSpec::REFERENCE, by: "name", min: 1 };
     }
     /// A function that is evaluated at points and returns rows of results. Give either grid or points.
     ExperimentSpec: "softvt.Experiment" as "experiment", constructor "softvt.experiment" {
@@ -201,7 +203,8 @@ record! {
         /// Result of softvt.options, passed to the functions below as opt.
         options: Option<Value>;
         /// Values of each parameter. Every combination is run, names in alphabetical order, the last one fastest.
-        grid: Option<BTreeMap<String, Vec<Value>>>;
+        grid: Option<BTreeMap<String, Vec<Value>>>
+            = Type::Map(&Type::Distinct { of: &Type::Any, by: "", min: 1 });
         /// Returns the points instead of a grid.
         points: Option<Function> = Type::Function("fun(opt: table): table[]");
         /// Returns a row, or a list of rows, for one point. Points run in any order and on several threads, each in a
@@ -211,7 +214,7 @@ record! {
         /// Summarizes all rows.
         finish: Option<Function> = Type::Function("fun(rows: table[], opt: table): softvt.Finish?");
         /// Columns of the table, in order; by default all, sorted.
-        columns: Vec<String> => Empty;
+        columns: Vec<String> = Type::Distinct { of: &Type::Text, by: "", min: 0 } => Empty;
     }
     /// Summary of an experiment.
     FinishSpec: "softvt.Finish" as "finish" {
@@ -292,22 +295,6 @@ functions! {
     }
 }
 
-/// Checks that a shift's range is one and holds its default.
-fn check_shift_range(lua: &Lua, record: &Record, table: &Table) -> mlua::Result<()> {
-    let bound =
-        |key: &str, open: f64| Ok::<_, mlua::Error>(table.raw_get::<Option<f64>>(key)?.unwrap_or(open));
-    let (min, max) = (bound("min", f64::NEG_INFINITY)?, bound("max", f64::INFINITY)?);
-    let default: f64 = table.raw_get("default")?;
-    let (key, message) = if min > max {
-        ("min", format!("{min} is above max, {max}; swap them"))
-    } else if !(min..=max).contains(&default) {
-        ("default", format!("{default} is outside of min and max; expected the value that changes nothing"))
-    } else {
-        return Ok(());
-    };
-    Err(error_at_key(lua, record.label, &ValidationError { path: vec![key.into()], message }))
-}
-
 /// Refuses the name of a measure of the verdict, which tables would show beside it.
 fn check_metric(lua: &Lua, record: &Record, table: &Table) -> mlua::Result<()> {
     let name = table.raw_get::<String>("name")?;
@@ -316,36 +303,6 @@ fn check_metric(lua: &Lua, record: &Record, table: &Table) -> mlua::Result<()> {
     }
     let message = format!("{name:?} is a field of every record; give another name");
     Err(error_at_key(lua, record.label, &ValidationError { path: vec!["name".into()], message }))
-}
-
-fn check_variation(lua: &Lua, record: &Record, table: &Table) -> mlua::Result<()> {
-    check_ends(lua, record, table, &[], &["size", "stiffness", "density", "friction", "light"])?;
-    match table.raw_get::<Option<Table>>("hidden")? {
-        Some(hidden) => {
-            let keys = ["aeration", "staling", "filling", "coating", "window_ratio"];
-            check_ends(lua, record, &hidden, &["hidden"], &keys)
-        }
-        None => Ok(()),
-    }
-}
-
-/// Checks that the ends of the ranges in `table`, which is at `path` in the record, are in order.
-fn check_ends(
-    lua: &Lua,
-    record: &Record,
-    table: &Table,
-    path: &[&'static str],
-    keys: &[&'static str],
-) -> mlua::Result<()> {
-    for &key in keys {
-        let [min, max] = table.raw_get::<[f64; 2]>(key)?;
-        if min > max {
-            let message = format!("the smallest factor {min} comes first and is above {max}; swap them");
-            let path = path.iter().copied().chain([key]).map(Into::into).collect();
-            return Err(error_at_key(lua, record.label, &ValidationError { path, message }));
-        }
-    }
-    Ok(())
 }
 
 impl VariationSpec {
@@ -373,22 +330,11 @@ impl VariationSpec {
     }
 }
 
+/// Refuses a condition with the name of the run without changes.
 fn check_conditions(lua: &Lua, record: &Record, table: &Table) -> mlua::Result<()> {
-    for key in ["suites", "conditions"] {
-        if table.raw_get::<Table>(key)?.raw_len() == 0 {
-            return Err(fail(lua, format!("conditions.{key}: expected at least one, got an empty list")));
-        }
-    }
     let conditions = Vec::<ConditionSpec>::from_checked(table.raw_get("conditions")?, lua)?;
-    let mut names = vec![REFERENCE.to_owned()];
-    for (index, ConditionSpec { name, .. }) in conditions.into_iter().enumerate() {
-        if names.contains(&name) {
-            let of = if name == REFERENCE { "the run without changes" } else { "another condition" };
-            let message = format!("{name:?} is the name of {of}; give another");
-            let path = vec!["conditions".into(), format!("[{}]", index + 1), "name".into()];
-            return Err(error_at_key(lua, record.label, &ValidationError { path, message }));
-        }
-        names.push(name);
-    }
-    Ok(())
+    let Some(at) = conditions.iter().position(|condition| condition.name == REFERENCE) else { return Ok(()) };
+    let message = format!("{REFERENCE:?} is the name of the run without changes; give another");
+    let path = vec!["conditions".into(), format!("[{}]", at + 1), "name".into()];
+    Err(error_at_key(lua, record.label, &ValidationError { path, message }))
 }

@@ -11,17 +11,15 @@ use super::{
 };
 use crate::{
     schema::{FieldDefault, FromChecked, LuaType, Range, Type, choice, class, functions, invalid, record_of},
-    vm::{
-        error::fail,
-        memory_budget::{Reservation, reserve},
-    },
+    vm::error::fail,
 };
 use softvt_common::{parallel::lock, text::AXIS_NAMES};
 use softvt_scene::{LabelLine, MAX_LETTERS, Mask, Scene, TextDecal, Typeface, Visual, VisualLayer};
 
 /// Lengths of patterns. Finer ones cannot be seen, and their waves exceed the numbers of the renderer.
-const LENGTHS: Range = Range::at_least(1e-6);
+const LENGTHS: Range = Range::at_least(1e-6).usually(1e-6, 5.0);
 const LENGTH: Type = Type::Number("m", LENGTHS);
+const COORDINATE: Type = Type::Number("m", Range::ANY.usually(-5.0, 5.0));
 const SHARE: Type = Type::Number("", Range::closed(0.0, 1.0));
 const COSINE: Type = Type::Number("", Range::closed(-1.0, 1.0));
 const NOISE_VALUE: Type = Type::Number("", Range::closed(-1.0, 2.0));
@@ -118,25 +116,22 @@ struct MaskNode {
     mask: Arc<Mask>,
     /// Masks that it is made of, each as often as it occurs.
     parts: usize,
-    /// Memory it keeps, bytes; parts shared with other masks count for each of them.
-    bytes: usize,
-    _reserved: Reservation,
 }
 
 impl LuaMask {
-    fn new(lua: &Lua, mask: Mask, parts: usize, bytes: usize) -> mlua::Result<Self> {
+    fn new(lua: &Lua, mask: Mask, parts: usize) -> mlua::Result<Self> {
         if parts > MAX_PARTS {
             let message = format!(
                 "mask: is made of {parts} masks; at most {MAX_PARTS} can be drawn; use fewer, or more layers"
             );
             return Err(fail(lua, message));
         }
-        Ok(Self(Arc::new(MaskNode { mask: Arc::new(mask), parts, bytes, _reserved: reserve(lua, bytes)? })))
+        Ok(Self(Arc::new(MaskNode { mask: Arc::new(mask), parts })))
     }
 
     /// A mask that is not made of others.
     fn simple(lua: &Lua, mask: Mask) -> mlua::Result<Self> {
-        Self::new(lua, mask, 1, size_of::<Mask>())
+        Self::new(lua, mask, 1)
     }
 }
 
@@ -165,13 +160,12 @@ class! {
                     _ => (vec![this.0.mask.clone()], 1),
                 };
                 masks.push(other.0.mask.clone());
-                let bytes = this.0.bytes + other.0.bytes + size_of::<Mask>();
-                LuaMask::new(lua, Mask::Product { masks }, this.0.parts + other.0.parts + own, bytes)?
+                LuaMask::new(lua, Mask::Product { masks }, this.0.parts + other.0.parts + own)?
             }
             /// Returns 1 minus the mask.
             fn inverted(lua, this) -> ["softvt.Mask"] {
-                let MaskNode { mask, parts, bytes, .. } = &*this.0;
-                LuaMask::new(lua, Mask::Inverse { mask: mask.clone() }, parts + 1, bytes + size_of::<Mask>())?
+                let MaskNode { mask, parts } = &*this.0;
+                LuaMask::new(lua, Mask::Inverse { mask: mask.clone() }, parts + 1)?
             }
         }
     }
@@ -206,9 +200,9 @@ functions! {
             /// Direction.
             axis: Direction => Text("z");
             /// Coordinate at which it is 0.
-            from_m: f64 = Type::Number("m", Range::ANY);
+            from_m: f64 = COORDINATE;
             /// Coordinate at which it is 1; may be below from_m.
-            to_m: f64 = Type::Number("m", Range::ANY);
+            to_m: f64 = COORDINATE;
         } -> ["softvt.Mask"] {
             check_ramp(lua, "mask.gradient", [from_m, to_m], ["from_m", "to_m"])?;
             LuaMask::simple(lua, Mask::Gradient { axis: axis.0, from_m, to_m })?
@@ -296,8 +290,7 @@ functions! {
             /// Width of the border, half of it on either side of the shape's surface.
             soft_m: f64 = Type::Number("m", Range::NOT_NEGATIVE) => Number(0.0);
         } -> ["softvt.Mask"] {
-            let bytes = size_of::<Mask>() + shape.bytes();
-            LuaMask::new(lua, Mask::Inside { shape: Arc::new(shape.copy()), soft_m }, 1, bytes)?
+            LuaMask::simple(lua, Mask::Inside { shape: Arc::new(shape.copy()), soft_m })?
         }
         /// The letters of a line of text, printed on surfaces that face the reader. Surfaces with text are drawn in
         /// finer detail.
@@ -322,9 +315,7 @@ functions! {
             let facing = facing.0;
             let line = LabelLine { text, typeface: font, height_m, weight, at, facing, turn: angle, wrap_m };
             check_label(lua, &line)?;
-            let decal = TextDecal::new(line);
-            let bytes = decal.bytes();
-            LuaMask::new(lua, Mask::Text { decal: Arc::new(decal) }, 1, bytes)?
+            LuaMask::simple(lua, Mask::Text { decal: Arc::new(TextDecal::new(line)) })?
         }
     }
 }

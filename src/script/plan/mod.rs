@@ -23,7 +23,7 @@ use crate::{
         simulation::settings,
         tasks::{ConditionSpec, ConditionsSpec, ExperimentSpec, SuiteSpec, TaskSpec},
     },
-    schema::{Constructed, FromChecked, Record, RecordType, is_constructed, strict_table},
+    schema::{Constructed, FromChecked, Record, RecordType, UnusualNumbers, is_constructed, strict_table},
     vm::{
         Vm, VmLimits,
         error::{ScriptError, fail, fail_at},
@@ -34,16 +34,16 @@ use crate::{
     },
 };
 use options::{OptionSession, OptionSpec, SharedOptions};
-use points::check_grid;
 pub(crate) use points::{Points, points};
 use softvt_benchmark::{
-    Condition, Goal, ObjectType, Plan, Shift, ShiftValue, Suite, Task, TaskDifference,
-    goal_conflict::conflict, metric::Metric, seed::SecretSeed, settings::Settings,
+    Condition, ObjectType, Plan, Shift, ShiftValue, Suite, Task, TaskDifference, goal_conflict::conflict,
+    seed::SecretSeed, settings::Settings,
 };
 use softvt_common::{
     parallel::lock,
-    text::{exact_number, is_control, unknown_name},
+    text::{is_control, unknown_name},
 };
+use softvt_rollout::AssetCache;
 
 /// Kind of the main file of a script.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -64,6 +64,8 @@ pub struct ScriptSources {
     pub bundle: Arc<ScriptFiles>,
     argv: Vec<String>,
     limits: VmLimits,
+    /// What is derived from the shapes and assets that they make.
+    pub assets: AssetCache,
 }
 
 impl ScriptSources {
@@ -77,10 +79,11 @@ impl ScriptSources {
         convert: impl FnOnce(&ScriptInstance) -> Result<T, ScriptError>,
     ) -> Result<(Self, T), ScriptError> {
         let (library, main) = Library::open(path)?;
-        let instance = ScriptInstance::open(kind, &main, library, argv, limits, |_| ())?;
+        let assets = AssetCache::default();
+        let instance = ScriptInstance::open(kind, &main, library, argv, limits, &assets, |_| ())?;
         let result = convert(&instance)?;
         let bundle = Arc::new(lock(&instance.vm.library).bundle.clone());
-        Ok((Self { kind, main, bundle, argv: argv.to_vec(), limits: limits.clone() }, result))
+        Ok((Self { kind, main, bundle, argv: argv.to_vec(), limits: limits.clone(), assets }, result))
     }
 
     /// Runs the main file again in a new virtual machine.
@@ -91,7 +94,7 @@ impl ScriptSources {
     /// As [`ScriptSources::instance`], with a virtual machine that `prepare` has changed before the main file runs.
     pub(crate) fn instance_with(&self, prepare: impl FnOnce(&Lua)) -> Result<ScriptInstance, ScriptError> {
         let library = Library::frozen((*self.bundle).clone());
-        ScriptInstance::open(self.kind, &self.main, library, &self.argv, &self.limits, prepare)
+        ScriptInstance::open(self.kind, &self.main, library, &self.argv, &self.limits, &self.assets, prepare)
     }
 }
 
@@ -118,14 +121,17 @@ impl LoadedScript {
         hashes
     }
 
-    /// Lines, as `file:line`, of shapes that the script makes and does not use, such as the result of a method that it
-    /// does not keep. Runs the script again.
+    /// Warnings about the script, with file and line: shapes that it makes and does not use, and numbers outside of
+    /// their usual range. Runs the script again.
     ///
     /// # Errors
     /// As [`load`].
-    pub fn unused_shapes(&self) -> Result<Vec<String>, ScriptError> {
-        let instance = self.sources.instance()?;
-        UnusedShapes::lines(&instance.vm.lua).map_err(|e| instance.vm.explain(&e))
+    pub fn warnings(&self) -> Result<Vec<String>, ScriptError> {
+        let ScriptInstance { vm, .. } = self.sources.instance()?;
+        let unused = UnusedShapes::lines(&vm.lua).map_err(|e| vm.explain(&e))?.into_iter().map(|line| {
+            format!("{line}: makes a shape that is not used; the methods of a shape return a new one: shape = shape:translate(…)")
+        });
+        Ok(unused.chain(UnusualNumbers::of(&vm.lua)).collect())
     }
 }
 
@@ -167,8 +173,8 @@ pub fn load_with(path: &Path, argv: &[String], limits: &VmLimits) -> Result<Load
 /// If a file is missing, the script fails, or its options or its plan are invalid.
 pub fn load_files(main: &str, files: ScriptFiles, argv: &[String]) -> Result<LoadedScript, ScriptError> {
     let (limits, bundle) = (VmLimits::default(), Arc::new(files));
-    let sources =
-        ScriptSources { kind: ScriptKind::Plan, main: main.to_owned(), bundle, argv: argv.to_vec(), limits };
+    let (kind, main, argv) = (ScriptKind::Plan, main.to_owned(), argv.to_vec());
+    let sources = ScriptSources { kind, main, bundle, argv, limits, assets: AssetCache::default() };
     let instance = sources.instance()?;
     let options = lock(&instance.options).declared.clone();
     let plan = instance.plan().map_err(|e| instance.vm.explain(&e))?;
@@ -181,7 +187,7 @@ pub fn load_files(main: &str, files: ScriptFiles, argv: &[String]) -> Result<Loa
 /// If the file cannot be read or is not Lua.
 pub fn declared_options(path: &Path) -> Result<Vec<OptionSpec>, ScriptError> {
     let (library, main) = Library::open(path)?;
-    let instance = ScriptInstance::new(&main, library, &[], &VmLimits::default())?;
+    let instance = ScriptInstance::new(&main, library, &[], &VmLimits::default(), &AssetCache::default())?;
     let outcome = instance.vm.run_main();
     let declared = lock(&instance.options).declared.clone();
     if declared.is_empty() { outcome.map(|_| declared) } else { Ok(declared) }
@@ -197,8 +203,15 @@ pub(crate) struct ScriptInstance {
 
 impl ScriptInstance {
     /// A virtual machine in which nothing has run yet.
-    fn new(main: &str, library: Library, argv: &[String], limits: &VmLimits) -> Result<Self, ScriptError> {
+    fn new(
+        main: &str,
+        library: Library,
+        argv: &[String],
+        limits: &VmLimits,
+        assets: &AssetCache,
+    ) -> Result<Self, ScriptError> {
         let vm = Vm::new(main, library, limits)?;
+        vm.lua.set_app_data(assets.clone());
         let options = OptionSession::new(argv);
         install(&vm, &options).map_err(|e| vm.explain(&e))?;
         Ok(Self { vm, options, result: None })
@@ -210,9 +223,10 @@ impl ScriptInstance {
         library: Library,
         argv: &[String],
         limits: &VmLimits,
+        assets: &AssetCache,
         prepare: impl FnOnce(&Lua),
     ) -> Result<Self, ScriptError> {
-        let mut instance = Self::new(main, library, argv, limits)?;
+        let mut instance = Self::new(main, library, argv, limits, assets)?;
         prepare(&instance.vm.lua);
         if kind == ScriptKind::Policy {
             instance.vm.privilege.expect_declaration();
@@ -281,10 +295,8 @@ impl ScriptInstance {
         if let Some(spec) = self.result::<ExperimentSpec>()? {
             let _deadline = self.vm.call_deadline();
             let points = points(lua, &spec)?.len();
-            check_grid(lua, &spec)?;
-            let columns = columns(lua, &spec)?;
-            let has_finish = spec.spec.finish.is_some();
-            return Ok(Plan::Experiment { name: spec.spec.name, points, columns, has_finish });
+            let ExperimentSpec { name, columns, finish, .. } = spec.spec;
+            return Ok(Plan::Experiment { name, points, columns, has_finish: finish.is_some() });
         }
         let specs = self.suites()?.filter(|specs| !specs.is_empty()).ok_or_else(|| {
             let got = self.result.as_ref().map_or("nothing".to_owned(), describe);
@@ -410,10 +422,6 @@ fn install(vm: &Vm, options: &SharedOptions) -> mlua::Result<()> {
 /// The suite of a declaration.
 pub(crate) fn suite(lua: &Lua, spec: &Constructed<SuiteSpec>) -> mlua::Result<Suite> {
     let name = spec.name.clone();
-    if spec.tasks.is_empty() {
-        let message = format!("suite.tasks: suite {name:?} has no tasks; give at least one");
-        return Err(fail_at_key(lua, &spec.table, "tasks", message));
-    }
     let budget = match spec.tasks_differ_in {
         TaskDifference::Object => 700,
         TaskDifference::Spatial => 500,
@@ -433,12 +441,6 @@ pub(crate) fn suite(lua: &Lua, spec: &Constructed<SuiteSpec>) -> mlua::Result<Su
             return Err(fail_at_key(lua, table, "prompt", message));
         }
         tasks.push(task);
-    }
-    let is_twice = |at: &usize| spec.shifts[..*at].iter().any(|shift| shift.name == spec.shifts[*at].name);
-    if let Some(at) = (1..spec.shifts.len()).find(is_twice) {
-        let message =
-            format!("suite.shifts: two are named {:?}; give each a name of its own", spec.shifts[at].name);
-        return Err(fail_at_key(lua, &spec.table, "shifts", message));
     }
     let shifts = spec.shifts.iter().map(|shift| Shift {
         name: shift.name.clone(),
@@ -460,7 +462,7 @@ pub(crate) fn suite(lua: &Lua, spec: &Constructed<SuiteSpec>) -> mlua::Result<Su
         tasks,
         shifts: shifts.collect(),
         vary: spec.vary.as_ref().map(|vary| vary.ranges()),
-        metrics: metrics(lua, spec)?,
+        metrics: spec.metrics.iter().map(|metric| metric.plain()).collect(),
         settings: settings(
             lua,
             "suite.settings",
@@ -470,25 +472,6 @@ pub(crate) fn suite(lua: &Lua, spec: &Constructed<SuiteSpec>) -> mlua::Result<Su
         twin_of: twin_of(lua, spec)?,
         teacher: spec.teacher.unwrap_or_default(),
     })
-}
-
-/// Largest number of metrics of a suite.
-const MAX_METRICS: usize = 32;
-
-/// The metrics of a suite, whose names must differ.
-fn metrics(lua: &Lua, spec: &Constructed<SuiteSpec>) -> mlua::Result<Vec<Metric>> {
-    let metrics: Vec<Metric> = spec.metrics.iter().map(|metric| metric.plain()).collect();
-    let twice = (1..metrics.len()).find(|&at| metrics[..at].iter().any(|m| m.name == metrics[at].name));
-    let message = match twice {
-        Some(at) => {
-            format!("suite.metrics: two are named {:?}; give each a name of its own", metrics[at].name)
-        }
-        None if metrics.len() > MAX_METRICS => {
-            format!("suite.metrics: there are {}; give at most {MAX_METRICS}", metrics.len())
-        }
-        None => return Ok(metrics),
-    };
-    Err(fail_at_key(lua, &spec.table, "metrics", message))
 }
 
 /// The suite whose rigid twin this one is, which must say that its objects are rigid.
@@ -511,14 +494,6 @@ fn task(lua: &Lua, id: usize, spec: &Constructed<TaskSpec>, budget: u32) -> mlua
                 "task.goal.target: is {target:?}, which is the object itself; name what it must reach"
             );
             return Err(fail_at_key(lua, table, "target", message));
-        }
-        if let Goal::Turned { range: [low, high], .. } = goal
-            && low > high
-        {
-            let [low, high] = [low, high].map(|value| exact_number(*value));
-            let message =
-                format!("task.goal.range: the lowest value {low} is above the highest, {high}; swap them");
-            return Err(fail_at_key(lua, table, "range", message));
         }
     }
     if spec.prompt.contains(is_control) || spec.prompt.trim().is_empty() {
@@ -570,16 +545,4 @@ fn condition(lua: &Lua, list: &Table, spec: &ConditionSpec) -> mlua::Result<Cond
         only: spec.only,
         rigid_twin: spec.rigid_twin,
     })
-}
-
-/// The columns of the table of an experiment, whose names must differ.
-fn columns(lua: &Lua, spec: &Constructed<ExperimentSpec>) -> mlua::Result<Vec<String>> {
-    let columns = &spec.columns;
-    match (1..columns.len()).find(|at| columns[..*at].contains(&columns[*at])) {
-        Some(twice) => {
-            let message = format!("experiment.columns: has {:?} twice; give each once", columns[twice]);
-            Err(fail_at_key(lua, &spec.table, "columns", message))
-        }
-        None => Ok(columns.clone()),
-    }
 }

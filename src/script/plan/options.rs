@@ -10,22 +10,19 @@ use serde::{Deserialize, Serialize};
 
 use crate::{
     schema::{
-        FromChecked, LuaType, Range, RecordType, Type, Unchecked, ValidationError, error_at_key, functions,
-        record, strict_table,
+        FromChecked, LuaType, Range, RecordType, Type, Unchecked, error_at_key, functions, record,
+        strict_table,
     },
     vm::{
         error::{ScriptError, app_data, fail},
         value::{describe, sorted_pairs},
     },
 };
-use softvt_common::{
-    parallel::lock,
-    text::{exact_number, suggest},
-};
+use softvt_common::{parallel::lock, text::suggest};
 
 record! {
     /// An option of the script: key gap_mm is --gap-mm on the command line. The default determines the type.
-    OptionRecord: "softvt.Option" as "option" {
+    OptionRecord: "softvt.Option" as "option", relation NotDecreasing(&["min", "max"]) {
         /// A number, string, boolean, or list of numbers or strings.
         default: Value;
         /// True if only whole numbers are allowed.
@@ -332,13 +329,6 @@ fn declare(lua: &Lua, session: &mut OptionSession, key: &Value, value: &Value) -
         needs_out: record.needs_out,
         name,
     };
-    if let (Some(min), Some(max)) = (record.min, record.max)
-        && min > max
-    {
-        let message = format!("{} is above max, {}; swap them", exact_number(min), exact_number(max));
-        let error = ValidationError::new(message).inside("min").inside(spec.name.clone());
-        return Err(error_at_key(lua, "options", &error));
-    }
     if spec.parse(&spec.default.to_string()).is_none() {
         return Err(fail(lua, format!("options.{}.default: expected {}", spec.name, spec.expects())));
     }

@@ -7,7 +7,7 @@ use mlua::{Lua, Table, Value};
 use crate::{
     api::tasks::ExperimentSpec,
     schema::Constructed,
-    vm::{error::fail, source_map::fail_at_key, value::describe},
+    vm::{error::fail, value::describe},
 };
 use softvt_common::text::{is_misspelt, unknown_name};
 
@@ -83,31 +83,6 @@ impl Points {
     }
 }
 
-/// Checks that no parameter of a grid has a value twice.
-pub(crate) fn check_grid(lua: &Lua, spec: &Constructed<ExperimentSpec>) -> mlua::Result<()> {
-    for (name, values) in spec.grid.iter().flatten() {
-        let mut seen = BTreeSet::new();
-        if let Some(twice) = values.iter().find(|value| key_of(value).is_some_and(|key| !seen.insert(key))) {
-            let value = describe(twice);
-            let message = format!("experiment.grid.{name}: has {value} twice; give each value once");
-            return Err(fail_at_key(lua, &spec.table, "grid", message));
-        }
-    }
-    Ok(())
-}
-
-/// Type and bytes of a number, text or boolean.
-fn key_of(value: &Value) -> Option<(u8, Vec<u8>)> {
-    let number = |x: f64| (0, (x + 0.0).to_bits().to_le_bytes().to_vec());
-    match value {
-        Value::Integer(i) => Some(number(*i as f64)),
-        Value::Number(x) => Some(number(*x)),
-        Value::String(text) => Some((1, text.as_bytes().to_vec())),
-        Value::Boolean(flag) => Some((2, vec![u8::from(*flag)])),
-        _ => None,
-    }
-}
-
 /// The points of an experiment: those of its function, or every combination of its grid.
 pub(crate) fn points(lua: &Lua, spec: &Constructed<ExperimentSpec>) -> mlua::Result<Points> {
     match (&spec.points, &spec.grid) {
@@ -128,12 +103,6 @@ pub(crate) fn points(lua: &Lua, spec: &Constructed<ExperimentSpec>) -> mlua::Res
             }
         }
         (None, Some(grid)) => {
-            if let Some(name) = grid.iter().find_map(|(name, values)| values.is_empty().then_some(name)) {
-                return Err(fail(
-                    lua,
-                    format!("experiment.grid.{name}: expected at least one value, got none"),
-                ));
-            }
             let grid = Points::Grid(
                 grid.iter().rev().map(|(name, values)| (name.clone(), values.clone())).collect(),
             );

@@ -2,7 +2,7 @@
 
 use std::{collections::BTreeMap, sync::Arc};
 
-use mlua::{FromLua, Function, Lua, Table, Value};
+use mlua::{FromLua, Function, Lua, Value};
 
 use super::{
     expert::{ExpertController, ExpertGrip},
@@ -12,14 +12,14 @@ use crate::{
     api::{
         envelope::draw,
         expert_input::SuiteInstances,
-        expert_names::{check_expert, joint_range, movable_object},
         goals::DeclaredPredicate,
         random::LuaRng,
         scene::{LuaScene, empty_scene},
+        scene_names::{self, check_expert, movable_object},
         tasks::{SuiteSpec, TaskSpec},
     },
     plan::{self, FoundTask, LoadedScript, ScriptInstance},
-    schema::{Constructed, Range, Type},
+    schema::{Constructed, Range, Type, UnusualNumbers},
     vm::{
         error::{ScriptError, fail},
         source_map::fail_at_key,
@@ -34,12 +34,13 @@ use softvt_benchmark::{
 use softvt_common::episode_id::EpisodeId;
 use softvt_common::{
     parallel::lock,
+    range::RangeError,
     text::{AXIS_NAMES, format_number, unknown_name},
 };
 use softvt_geometry::{Aabb, Vec3};
 use softvt_robot::{gripper::MAX_WIDTH, panda};
 use softvt_rollout::{MeasuredMetric, StatePredicate};
-use softvt_scene::{Body, CameraSettings, Scene, SceneVariation};
+use softvt_scene::{CameraSettings, Scene, SceneVariation};
 
 /// Rounding of lengths, m, and of the numbers of quaternions.
 const ROUNDING: f64 = 1e-9;
@@ -104,6 +105,11 @@ impl EpisodeSetup {
             object.placed_at.clone_from(&nominal.placed_at);
         }
         self.prompt != self.nominal_prompt || scene != self.nominal
+    }
+
+    /// Messages about numbers of the script outside of their usual range, with file and line.
+    pub fn unusual_numbers(&self) -> Vec<String> {
+        UnusualNumbers::of(&self.instance.vm.lua)
     }
 
     /// The controller that runs the expert of the task; `None` if the task has no expert.
@@ -174,18 +180,7 @@ impl SceneBuilder {
         for scene in [&mut scene, &mut nominal] {
             changes.cameras.apply(&mut scene.cameras);
         }
-        predicates
-            .iter()
-            .try_for_each(|p| check_predicate(&vm.lua, p, &scene))
-            .and_then(|()| check_joint_ranges(&vm.lua, &task, &scene))
-            .map_err(|e| vm.explain(&e))?;
-        if let Some(expert) = &task.expert {
-            check_expert(&vm.lua, expert, &nominal).map_err(|e| vm.explain(&e))?;
-        }
-        if task.object.is_some() {
-            check_object(&vm.lua, &task.table, "task.object", "object", &object, &scene)
-                .map_err(|e| vm.explain(&e))?;
-        }
+        check_names(&vm.lua, &task, &predicates, &scene, &nominal).map_err(|e| vm.explain(&e))?;
         check_workspace(&scene)
             .map_err(|what| vm.explain(&fail_at_key(&vm.lua, &task.layout.table, "build", what)))?;
         let largest = ranges.map_or(1.0, |ranges| ranges.size.max);
@@ -371,8 +366,11 @@ fn check_width(
     let Some(object) = scene.objects.iter().find(|object| object.name == name) else { return Ok(()) };
     let drawn = variation.and_then(|variation| variation.objects.get(name)).map_or(1.0, |drawn| drawn.scale);
     let scale = if drawn == 1.0 { object.scale } else { object.scale / drawn * largest };
+    if scale == 1.0 {
+        return Ok(());
+    }
     let width = object.nominal.grasp_width() * scale;
-    if scale == 1.0 || width < MAX_WIDTH {
+    if width < MAX_WIDTH {
         return Ok(());
     }
     let message = format!(
@@ -434,8 +432,8 @@ pub enum ShiftError {
     #[error("{}", unknown_shift(name, known.iter().map(String::as_str)))]
     Unknown { name: String, known: Vec<String> },
     /// The value is out of the declared range.
-    #[error("shift {name}: expected a number{range} ({unit}), got {value}")]
-    Value { name: String, range: String, unit: String, value: String },
+    #[error("shift {0}")]
+    Value(#[from] RangeError),
 }
 
 /// Checks the value of a shift against those that a suite declares.
@@ -443,70 +441,42 @@ pub enum ShiftError {
 /// # Errors
 /// If the shift is unknown or the value is out of its range; the message is a fragment.
 pub fn check_shift(shifts: &[Shift], name: &str, value: f64) -> Result<(), ShiftError> {
-    let name = name.to_owned();
     let Some(shift) = shifts.iter().find(|shift| shift.name == name) else {
         let known = shifts.iter().map(|shift| shift.name.clone()).collect();
-        return Err(ShiftError::Unknown { name, known });
+        return Err(ShiftError::Unknown { name: name.to_owned(), known });
     };
-    let range = Range::between(shift.min, shift.max);
-    if range.contains(value) {
-        return Ok(());
-    }
-    let (range, unit, value) = (range.describe(), shift.unit.clone(), format_number(value));
-    Err(ShiftError::Value { name, range, unit, value })
+    Ok(Range::between(shift.min, shift.max).check(name, value, &shift.unit)?)
 }
 
-/// Checks that the objects and joints of a predicate exist, and that its object can move.
-fn check_predicate(lua: &Lua, predicate: &DeclaredPredicate, scene: &Scene) -> mlua::Result<()> {
-    let DeclaredPredicate { goal, table, .. } = predicate;
-    if let Some(name) = goal.object() {
-        let key = predicate.field("object");
-        check_object(lua, table, &format!("task.goal.{key}"), key, name, scene)?;
-    }
-    if let Some(name) = goal.target() {
-        let key = predicate.field("target");
-        let known = scene.names();
-        let known = known.iter().map(String::as_str);
-        if !known.clone().any(|known| known == name) {
-            let message = format!("task.goal.{key}: {}", unknown_name("object", name, known));
-            return Err(fail_at_key(lua, table, key, message));
-        }
-        let object = scene.objects.iter().find(|object| object.name == name);
-        if let Some(Body::Scenery) = object.map(|object| &object.asset.body) {
-            let message = format!(
-                "task.goal.{key}: {name:?} is softvt.scenery, which has no contact; name an object that has"
-            );
-            return Err(fail_at_key(lua, table, key, message));
-        }
-    }
-    if let Some(name) = goal.joint()
-        && let Err(what) = joint_range(scene, name)
-    {
-        return Err(fail_at_key(lua, table, "joint", format!("task.goal.joint: {what}")));
-    }
-    Ok(())
-}
-
-/// Checks that the predicates of a goal can hold at once, given the ranges of its joints.
-fn check_joint_ranges(lua: &Lua, task: &Constructed<TaskSpec>, scene: &Scene) -> mlua::Result<()> {
-    let (goal, _) = task.goal.plain(lua)?;
-    match conflict(&goal.with_joint_ranges(&|name| Some(joint_range(scene, name).ok()?.limits))) {
-        Some(conflict) => {
-            let message = format!("task.goal: can never be met: {conflict}");
-            Err(fail_at_key(lua, &task.table, "goal", message))
-        }
-        None => Ok(()),
-    }
-}
-
-/// Checks that the object named by the key `key` of `table` exists and can move.
-fn check_object(
+/// Checks that a scene has the objects and joints that a task names, and that its goal can hold with the ranges of
+/// these joints. `nominal` is the scene without the shifts.
+fn check_names(
     lua: &Lua,
-    table: &Table,
-    label: &str,
-    key: &str,
-    name: &str,
+    task: &Constructed<TaskSpec>,
+    predicates: &[DeclaredPredicate],
     scene: &Scene,
+    nominal: &Scene,
 ) -> mlua::Result<()> {
-    movable_object(scene, name).map_err(|what| fail_at_key(lua, table, key, format!("{label}: {what}")))
+    for predicate in predicates {
+        let DeclaredPredicate { goal, table, .. } = predicate;
+        let named = [
+            ("object", goal.object().map(|name| movable_object(scene, name))),
+            ("target", goal.target().map(|name| scene_names::touchable(scene, name))),
+            ("joint", goal.joint().map(|name| scene_names::joint(scene, name).map(drop))),
+        ];
+        for (field, found) in named {
+            let Some(Err(what)) = found else { continue };
+            let key = predicate.field(field);
+            return Err(fail_at_key(lua, table, key, format!("task.goal.{key}: {what}")));
+        }
+    }
+    if let Some(Err(what)) = task.object.as_ref().map(|name| movable_object(scene, name)) {
+        return Err(fail_at_key(lua, &task.table, "object", format!("task.object: {what}")));
+    }
+    let limits = |name: &str| scene_names::joint(scene, name).ok().map(|joint| [joint.lower, joint.upper]);
+    if let Some(conflict) = conflict(&task.goal.plain(lua)?.0.with_joint_ranges(&limits)) {
+        let message = format!("task.goal: can never be met: {conflict}");
+        return Err(fail_at_key(lua, &task.table, "goal", message));
+    }
+    task.expert.as_ref().map_or(Ok(()), |expert| check_expert(lua, expert, nominal))
 }

@@ -1,17 +1,17 @@
 //! Checks values against their declared types, and reports the line of the offending key.
 
-use std::f64::consts::TAU;
+use std::{collections::BTreeSet, f64::consts::TAU};
 
 use mlua::{Lua, Table, Value};
 
-use super::{Field, FieldDefault, Range, Record, Type, ValidationError, joined};
+use super::{Field, FieldDefault, Range, Record, Relation, Type, ValidationError, joined, note_unusual};
 use crate::vm::{
     error::{SourceLine, caller_line, current_line, fail, fail_at},
     list::plain,
     source_map,
-    value::{describe, number, sorted_pairs},
+    value::{describe, literal, number, sorted_pairs},
 };
-use softvt_common::text::{MAX_TEXT_BYTES, format_number, suggest, unknown_name};
+use softvt_common::text::{MAX_TEXT_BYTES, exact_number, format_number, suggest, unknown_name};
 
 /// Numbers whose largest magnitude is smaller have no direction.
 pub(crate) const MIN_LENGTH: f64 = 1e-9;
@@ -78,9 +78,26 @@ impl Type {
                 }
                 Ok(list)
             }
+            (Self::Interval(_, range), Value::Table(list)) => {
+                let (list, numbers) = self.check_numbers(lua, list, 2, *range)?;
+                match numbers[..] {
+                    [low, high] if low > high => {
+                        let [low, high] = [low, high].map(exact_number);
+                        let message =
+                            format!("the lowest value, {low}, is above the highest, {high}; swap them");
+                        Err(ValidationError::new(message))
+                    }
+                    _ => Ok(list),
+                }
+            }
             (Self::Direction(..), Value::Table(list)) => self.check_length(lua, list, 3, "a direction"),
             (Self::Quaternion(_), Value::Table(list)) => self.check_length(lua, list, 4, "a quaternion"),
             (Self::List(of), Value::Table(list)) => check_list(lua, of, list, &wrong),
+            (Self::Distinct { of, by, min }, Value::Table(list)) => {
+                let checked = check_list(lua, of, list, &wrong)?;
+                refuse_repeated(&checked, by, *min)?;
+                Ok(checked)
+            }
             (Self::Map(of), Value::Table(map)) => check_map(lua, of, map),
             (Self::Nested(record), Value::Table(table)) => check(lua, record, table).map(Value::Table),
             (Self::Constructed(records), Value::Table(table)) => {
@@ -205,6 +222,29 @@ fn check_list(
     Ok(Value::Table(out))
 }
 
+/// Refuses a list with too few values, or with two texts, numbers or booleans that are the same in the field `by`.
+fn refuse_repeated(list: &Value, by: &str, min: usize) -> Result<(), ValidationError> {
+    let values = list.as_table().into_iter().flat_map(|list| list.sequence_values::<Value>()).flatten();
+    let mut seen = BTreeSet::new();
+    let mut count = 0;
+    for value in values {
+        count += 1;
+        let key = match &value {
+            Value::Table(table) if !by.is_empty() => table.raw_get(by)?,
+            _ => value,
+        };
+        if !key.is_table() && !seen.insert(literal(&key, 0)) {
+            let repeated =
+                ValidationError::new(format!("{} is there already; give each once", describe(&key)));
+            return Err(repeated.inside(format!("[{count}]")));
+        }
+    }
+    match count < min {
+        true => Err(ValidationError::new(format!("expected at least {min}, got {count}"))),
+        false => Ok(()),
+    }
+}
+
 fn check_map(lua: &Lua, of: &Type, map: &Table) -> Result<Value, ValidationError> {
     let out = lua.create_table()?;
     for (key, value) in sorted_pairs(map) {
@@ -245,7 +285,33 @@ pub(crate) fn check(lua: &Lua, record: &Record, table: &Table) -> Result<Table, 
         };
         out.raw_set(field.name, value.map_err(|error| error.inside(field.name))?)?;
     }
+    if let Some(relation) = &record.relation {
+        relation.check(&out)?;
+    }
     Ok(out)
+}
+
+impl Relation {
+    /// Checks the order of numbers in a table whose fields are valid.
+    fn check(&self, table: &Table) -> Result<(), ValidationError> {
+        let (fields, expected) = match self {
+            Self::Increasing(fields) => (fields, "more than"),
+            Self::NotDecreasing(fields) => (fields, "at least"),
+            Self::Checked(_) => return Ok(()),
+        };
+        let given = fields.iter().map(|field| Ok((*field, table.raw_get::<Option<f64>>(*field)?)));
+        let given = given.collect::<mlua::Result<Vec<_>>>()?;
+        let given: Vec<_> = given.into_iter().filter_map(|(field, value)| Some((field, value?))).collect();
+        for pair in given.windows(2) {
+            let [(before, low), (field, high)] = pair else { continue };
+            if low > high || (low == high && matches!(self, Self::Increasing(_))) {
+                let [low, high] = [*low, *high].map(exact_number);
+                let message = format!("expected {expected} {before}, {low}, got {high}");
+                return Err(ValidationError::new(message).inside(*field));
+            }
+        }
+        Ok(())
+    }
 }
 
 /// The value of a field that is not given. The error about a required one names all that `table` lacks.
@@ -276,10 +342,13 @@ fn absent(lua: &Lua, record: &Record, table: &Table, field: &Field) -> Result<Va
 }
 
 /// Checks a table that a script gave for `record`; the error is at the line of the wrong key.
-pub(crate) fn validate(lua: &Lua, record: &Record, value: &Value) -> mlua::Result<Table> {
+pub(crate) fn validate(lua: &Lua, record: &'static Record, value: &Value) -> mlua::Result<Table> {
     match plain(lua, value)? {
         Value::Table(table) => {
-            check(lua, record, &table).map_err(|error| error_at_key(lua, record.label, &error))
+            let checked = check(lua, record, &table);
+            let checked = checked.map_err(|error| error_at_key(lua, record.label, &error))?;
+            note_unusual(lua, record.label, &Type::Nested(record), &Value::Table(checked.clone()));
+            Ok(checked)
         }
         other => {
             let message =
@@ -292,7 +361,7 @@ pub(crate) fn validate(lua: &Lua, record: &Record, value: &Value) -> mlua::Resul
 /// The constructor of `record`: checks a table and marks it, so that it also refuses to be read by unknown keys.
 pub(crate) fn make(lua: &Lua, record: &'static Record, value: &Value) -> mlua::Result<Table> {
     let made = validate(lua, record, value)?;
-    if let Some(check) = record.relations {
+    if let Some(Relation::Checked(check)) = record.relation {
         check(lua, record, &made)?;
     }
     made.set_metatable(Some(metatable(lua, record)?))?;

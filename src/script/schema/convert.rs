@@ -211,7 +211,7 @@ pub(crate) use fields;
 /// ```text
 /// record! {
 ///     /// Documentation of the record, for Rust, stubs and reference alike.
-///     Name: "softvt.Class" as "label in messages", constructor "softvt.name", relations check_relations {
+///     Name: "softvt.Class" as "label in messages", constructor "softvt.name", relation Increasing(&["a", "b"]) {
 ///         /// Documentation of the field.
 ///         field: RustType = Type::Number("m", Range::POSITIVE) => Number(1.0);
 ///     }
@@ -219,13 +219,13 @@ pub(crate) use fields;
 /// ```
 ///
 /// The Lua type may be left out where [`LuaType`] of the Rust type says enough, and so may the default: an `Option` may
-/// then be absent, and a nested record of which every field has a default. Constructor and relations are optional.
+/// then be absent, and a nested record of which every field has a default. Constructor and [`Relation`](super::Relation) are optional.
 /// Gives the struct with its conversion from a checked table ([`FromChecked`]) and the [`Record`] by which tables are
 /// checked.
 macro_rules! record {
     ($(
         $(#[doc = $doc:literal])+
-        $name:ident : $class:literal as $label:literal $(, constructor $kind:literal)? $(, relations $check:path)? {$(
+        $name:ident : $class:literal as $label:literal $(, constructor $kind:literal)? $(, relation $relation:ident($related:expr))? {$(
             $(#[doc = $field_doc:literal])+
             $field:ident : $rust:ty $(= $ty:expr)? $(=> $presence:ident $(($default:expr))?)? ;
         )*}
@@ -238,7 +238,7 @@ macro_rules! record {
 
         $crate::schema::record_of! {
             $(#[doc = $doc])+
-            $name: $class as $label $(, constructor $kind)? $(, relations $check)? {$(
+            $name: $class as $label $(, constructor $kind)? $(, relation $relation($related))? {$(
                 $(#[doc = $field_doc])+
                 $field: $rust $(= $ty)? $(=> $presence $(($default))?)? ;
             )*}
@@ -253,7 +253,7 @@ pub(crate) use record;
 macro_rules! record_of {
     ($(
         $(#[doc = $doc:literal])+
-        $name:ident : $class:literal as $label:literal $(, constructor $kind:literal)? $(, relations $check:path)? {$(
+        $name:ident : $class:literal as $label:literal $(, constructor $kind:literal)? $(, relation $relation:ident($related:expr))? {$(
             $(#[doc = $field_doc:literal])+
             $field:ident : $rust:ty $(= $ty:expr)? $(=> $presence:ident $(($default:expr))?)? ;
         )*} $(by $make:expr ;)?
@@ -268,7 +268,9 @@ macro_rules! record_of {
                     $(#[doc = $field_doc])+
                     $field: $rust $(= $ty)? $(=> $presence $(($default))?)? ;
                 )*},
-                relations: $crate::schema::convert::first!($(Some($check),)? None),
+                relation: $crate::schema::convert::first!(
+                    $(Some($crate::schema::Relation::$relation($related)),)? None
+                ),
             };
         }
 
@@ -359,6 +361,13 @@ macro_rules! one_of {
             }
         }
 
+        impl $name {
+            /// Records of the constructors.
+            pub(crate) const RECORDS: &'static [&'static $crate::schema::Record] = &[
+                $(<$spec as $crate::schema::RecordType>::RECORD),+
+            ];
+        }
+
         impl $crate::schema::convert::HasTable for $name {
             fn table(&self) -> &mlua::Table {
                 match self { $(Self::$variant(made) => &made.table,)+ }
@@ -366,9 +375,7 @@ macro_rules! one_of {
         }
 
         impl $crate::schema::LuaType for $name {
-            const TYPE: $crate::schema::Type = $crate::schema::Type::Constructed(&[
-                $(<$spec as $crate::schema::RecordType>::RECORD),+
-            ]);
+            const TYPE: $crate::schema::Type = $crate::schema::Type::Constructed(Self::RECORDS);
         }
     };
 }

@@ -2,7 +2,7 @@
 
 use mlua::{Lua, MultiValue, Table, Value};
 
-use super::{FieldDefault, Type, error_at_key};
+use super::{FieldDefault, Type, error_at_key, note_unusual};
 use crate::vm::{error::fail, value::describe};
 use softvt_common::text::counted;
 
@@ -74,11 +74,13 @@ pub(crate) fn arguments(
             (Value::Nil, FieldDefault::Empty) => Value::Table(lua.create_table()?),
             (value, _) => value,
         };
-        param.ty.check(lua, &value).map_err(|error| match param.ty {
+        let checked = param.ty.check(lua, &value).map_err(|error| match param.ty {
             // The keys of a table say enough.
             Type::Nested(_) => error_at_key(lua, label, &error),
             _ => fail(lua, error.describe(&format!("{label}: {}", param.name))),
-        })
+        })?;
+        note_unusual(lua, label, &param.ty, &checked);
+        Ok(checked)
     });
     let checked = checked.collect::<mlua::Result<MultiValue>>()?;
     match values.find(|value| !value.is_nil()) {
@@ -142,7 +144,7 @@ macro_rules! signature {
                         kind: $class,
                         doc: DOC,
                         fields: $crate::schema::convert::fields! { $($fields)* },
-                        relations: None,
+                        relation: None,
                     };
                     $crate::schema::function::Param {
                         name: stringify!($table),

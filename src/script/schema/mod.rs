@@ -10,6 +10,7 @@ pub(crate) mod convert;
 pub(crate) mod function;
 pub(crate) mod object;
 mod output;
+mod usual;
 
 use mlua::{Lua, Table};
 
@@ -22,6 +23,7 @@ pub(crate) use convert::{
 pub(crate) use function::{Function, Signature, functions};
 pub(crate) use object::{ApiObject, Class, FieldValue, class};
 pub(crate) use output::{output, strict_table};
+pub(crate) use usual::{UnusualNumbers, note_unusual};
 
 /// The values that a field or parameter accepts.
 #[derive(Clone, Copy, Debug)]
@@ -40,6 +42,8 @@ pub(crate) enum Type {
     Boolean,
     /// A list of a fixed number of numbers in a unit, each within the range.
     Vector(usize, &'static str, Range),
+    /// The lowest and the highest of two numbers in a unit, each within the range.
+    Interval(&'static str, Range),
     /// A vector of any length but 0, in a frame, or one of these names of vectors.
     Direction(&'static [&'static str], &'static str),
     /// A quaternion w, x, y, z of any length but 0, in a frame.
@@ -50,6 +54,8 @@ pub(crate) enum Type {
     Function(&'static str),
     /// A list of values of one type.
     List(&'static Type),
+    /// A list of at least `min` values that differ in the field `by`, or, if that is "", themselves.
+    Distinct { of: &'static Type, by: &'static str, min: usize },
     /// A table from strings to values of one type.
     Map(&'static Type),
     /// A plain table, checked where it is written.
@@ -105,12 +111,20 @@ pub(crate) struct Record {
     pub kind: &'static str,
     pub doc: &'static str,
     pub fields: &'static [Field],
-    /// Checks relations between the fields of a table whose fields are valid.
-    pub relations: Option<RelationCheck>,
+    /// Relation between the fields.
+    pub relation: Option<Relation>,
 }
 
-/// See [`Record::relations`].
-pub(crate) type RelationCheck = fn(&Lua, &Record, &Table) -> mlua::Result<()>;
+/// A relation between the fields of a table whose fields are valid.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Relation {
+    /// Each of these numbers is above the one before it.
+    Increasing(&'static [&'static str]),
+    /// None of these numbers, of those that are given, is below the one before it.
+    NotDecreasing(&'static [&'static str]),
+    /// Another one, which the constructor checks.
+    Checked(fn(&Lua, &Record, &Table) -> mlua::Result<()>),
+}
 
 impl Record {
     /// `suite` of `softvt.suite`.
@@ -160,6 +174,7 @@ impl Type {
             Self::Vector(count, unit, range) => {
                 format!("a list of {count} numbers{} ({unit})", range.describe())
             }
+            Self::Interval(unit, range) => Self::Vector(2, unit, *range).describe(),
             Self::Direction([], frame) => Self::vector(3, frame).describe(),
             Self::Direction(names, frame) => {
                 format!("{} or {}", Self::Choice(names).describe(), Self::vector(3, frame).describe())
@@ -176,6 +191,7 @@ impl Type {
                 format!("a list of {}", of.describe().replacen("the result", "results", 1))
             }
             Self::List(of) => format!("a list of {}", of.describe()),
+            Self::Distinct { of, .. } => Self::List(of).describe(),
             Self::Map(of) => format!("a table from names to {}", of.describe()),
             Self::Nested(record) => format!("a table of {}", joined(record)),
             Self::Constructed(records) => {

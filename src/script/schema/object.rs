@@ -7,6 +7,7 @@ use mlua::{
 use super::{
     Type,
     function::{Signature, arguments},
+    note_unusual,
 };
 use crate::vm::{error::fail, list::LuaList, value::describe};
 use softvt_common::text::unknown_name;
@@ -84,7 +85,7 @@ pub(crate) enum FieldValue {
     /// Numbers that scripts may write one by one, if the field is writable.
     Numbers(Vec<f64>),
     /// A list that cannot be written, and how to change it instead.
-    Fixed(Table, &'static str),
+    ReadOnly(Table, &'static str),
 }
 
 /// Results of getters.
@@ -135,12 +136,12 @@ impl IntoFieldValue for &str {
 }
 
 /// A list that cannot be written; `hint` says how to change it instead.
-pub(crate) fn fixed_list<T: IntoLua>(
+pub(crate) fn read_only_list<T: IntoLua>(
     lua: &Lua,
     entries: impl IntoIterator<Item = T>,
     hint: &'static str,
 ) -> mlua::Result<FieldValue> {
-    Ok(FieldValue::Fixed(lua.create_sequence_from(entries)?, hint))
+    Ok(FieldValue::ReadOnly(lua.create_sequence_from(entries)?, hint))
 }
 
 /// Hint for lists of measured values.
@@ -423,19 +424,19 @@ fn read<T: ApiObject>(lua: &Lua, this: &T, key: &Value) -> mlua::Result<Value> {
     let label = || format!("{}.{name}", this.label());
     let list = match get(lua, this)? {
         FieldValue::Value(value) => return Ok(value),
-        FieldValue::Fixed(entries, hint) => LuaList::fixed(label(), entries, hint),
+        FieldValue::ReadOnly(entries, hint) => LuaList::read_only(label(), entries, hint),
         FieldValue::Numbers(numbers) if set.is_none() => {
             let hint = match T::CLASS.all_fields().nth(index).map(|field| field.access) {
                 Some(Access::Read(_, Some(hint))) => hint,
                 _ => MEASURED,
             };
-            LuaList::fixed(label(), lua.create_sequence_from(numbers)?, hint)
+            LuaList::read_only(label(), lua.create_sequence_from(numbers)?, hint)
         }
         FieldValue::Numbers(_) => {
             let (reader, writer) = (this.clone(), this.clone());
             let get = move |lua: &Lua| match get(lua, &reader)? {
                 FieldValue::Numbers(numbers) => Ok(numbers),
-                FieldValue::Value(_) | FieldValue::Fixed(..) => Ok(Vec::new()),
+                FieldValue::Value(_) | FieldValue::ReadOnly(..) => Ok(Vec::new()),
             };
             let set = move |lua: &Lua, value: &Value| write_field(lua, &writer, index, value);
             LuaList::live(label(), Box::new(get), Box::new(set))
@@ -470,6 +471,7 @@ fn write_field<T: ApiObject>(lua: &Lua, this: &T, index: usize, value: &Value) -
     match (&field.access, T::SETTERS.get(index).copied().flatten()) {
         (Access::Write(ty), Some(set)) => {
             let value = ty.check(lua, value).map_err(|error| fail(lua, error.describe(&label)))?;
+            note_unusual(lua, &label, ty, &value);
             set(lua, this, value)
         }
         (Access::Read(_, Some(hint)), _) => Err(fail(lua, format!("{label}: cannot be replaced; {hint}"))),

@@ -15,7 +15,7 @@ enum ListContent {
     /// Numbers of the object, which checks them when they are written.
     Live { get: Get, set: Set },
     /// The entries at the time of reading, and how to change them instead.
-    Fixed { entries: Table, hint: &'static str },
+    ReadOnly { entries: Table, hint: &'static str },
 }
 
 /// `softvt.List`.
@@ -35,15 +35,15 @@ impl LuaList {
     }
 
     /// A list that cannot be written; `hint` says how to change it instead.
-    pub(crate) fn fixed(label: String, entries: Table, hint: &'static str) -> Self {
-        Self { label, content: ListContent::Fixed { entries, hint } }
+    pub(crate) fn read_only(label: String, entries: Table, hint: &'static str) -> Self {
+        Self { label, content: ListContent::ReadOnly { entries, hint } }
     }
 
     /// Its entries as a plain list.
     fn entries(&self, lua: &Lua) -> mlua::Result<Table> {
         match &self.content {
             ListContent::Live { get, .. } => lua.create_sequence_from(get(lua)?),
-            ListContent::Fixed { entries, .. } => {
+            ListContent::ReadOnly { entries, .. } => {
                 lua.create_sequence_from(entries.sequence_values::<Value>().flatten())
             }
         }
@@ -67,7 +67,7 @@ impl LuaList {
         let label = &self.label;
         let (get, set) = match &self.content {
             ListContent::Live { get, set } => (get, set),
-            ListContent::Fixed { hint, .. } => {
+            ListContent::ReadOnly { hint, .. } => {
                 return Err(fail(lua, format!("{label}: cannot be written; {hint}")));
             }
         };

@@ -1,4 +1,4 @@
-//! Memory of host objects (images, shapes, masks, worlds), which Lua's own limit does not count.
+//! Memory of host objects (images, shapes, worlds), which Lua's own limit does not count.
 
 use std::sync::{
     Arc,
@@ -9,7 +9,8 @@ use mlua::Lua;
 
 use super::error::{app_data, fail};
 
-/// Bytes that the images, shapes and masks of one virtual machine may take together.
+/// Bytes that the images and shapes of one virtual machine may take together, and one more while it is made. Masks are
+/// small: Lua's own limit suffices.
 const MAX_OBJECT_BYTES: usize = 512 << 20;
 /// The same for its worlds and simulations: one soft body of 32 voxels along its edge takes half of it.
 const MAX_WORLD_BYTES: usize = 4 << 30;
@@ -34,13 +35,13 @@ impl Drop for Reservation {
     }
 }
 
-/// Reserves `bytes` for an image, shape or mask. If they do not fit, garbage is collected first.
+/// Reserves `bytes` for an image or shape. If they do not fit, garbage is collected first.
 ///
 /// # Errors
 /// If the budget is used up, at the script's line.
 pub(crate) fn reserve(lua: &Lua, bytes: usize) -> mlua::Result<Reservation> {
     let used = app_data::<MemoryUse>(lua)?.objects;
-    reserve_within(MAX_OBJECT_BYTES, used, lua, bytes, "images, shapes and masks; keep fewer or smaller ones")
+    reserve_within(MAX_OBJECT_BYTES, used, lua, bytes, "images and shapes; keep fewer or smaller ones")
 }
 
 /// Reserves `bytes` for the content of a world, as [`reserve`] does.

@@ -13,7 +13,7 @@ pub(crate) mod watchdog;
 use std::{
     collections::BTreeSet,
     sync::{
-        Arc, Mutex, OnceLock,
+        Arc, Mutex,
         atomic::{AtomicUsize, Ordering},
     },
     time::Duration,
@@ -76,17 +76,9 @@ impl std::fmt::Debug for VmLimits {
     }
 }
 
-static STUCK_HANDLER: OnceLock<StuckHandler> = OnceLock::new();
-
-/// Sets what happens if a library function of Lua (such as `string.find` with a hostile pattern) never returns. Nothing
-/// can interrupt it, so a program should end. Without a handler a message is printed and the thread stays busy.
-pub fn set_stuck_handler(handler: StuckHandler) {
-    // The first handler stays: there is one program per process.
-    let _ = STUCK_HANDLER.set(handler);
-}
-
 impl Default for VmLimits {
-    /// 256 MiB; 10 s to load, 5 s per call, 60 s per point; `print` to standard error.
+    /// 256 MiB; 10 s to load, 5 s per call, 60 s per point; `print` to standard error. A library function that does not
+    /// return ends the process, since nothing can interrupt it.
     fn default() -> Self {
         Self {
             memory_bytes: 256 << 20,
@@ -94,9 +86,9 @@ impl Default for VmLimits {
             call: Duration::from_secs(5),
             point: Duration::from_secs(60),
             grace: Duration::from_millis(1500),
-            on_stuck: Arc::new(|message| match STUCK_HANDLER.get() {
-                Some(handler) => handler(message),
-                None => eprint_line(message),
+            on_stuck: Arc::new(|message| {
+                eprint_line(&escape_control(&format!("softvt: {message}")));
+                std::process::exit(2);
             }),
             print: Arc::new(|text| eprint_line(&escape_control(text))),
         }
@@ -261,6 +253,18 @@ impl Vm {
 /// Translates an error of the virtual machine for the author of the script, from within one of its functions.
 pub(crate) fn explain(lua: &Lua, error: &mlua::Error) -> mlua::Result<ScriptError> {
     Ok(app_data::<Arc<VmState>>(lua)?.explain(error))
+}
+
+/// The table in the registry under a key, which does not keep its own keys alive.
+pub(crate) fn weak_table(lua: &Lua, key: &str) -> mlua::Result<Table> {
+    if let Ok(known) = lua.named_registry_value::<Table>(key) {
+        return Ok(known);
+    }
+    let (known, weak) = (lua.create_table()?, lua.create_table()?);
+    weak.set("__mode", "k")?;
+    known.set_metatable(Some(weak))?;
+    lua.set_named_registry_value(key, &known)?;
+    Ok(known)
 }
 
 /// Removes functions that reach the outside or the machine's own state.

@@ -10,6 +10,7 @@ use mlua::{Lua, Table};
 use super::{
     error::{SourceLine, app_data, current_line, fail_at},
     library::Library,
+    weak_table,
 };
 use softvt_common::parallel::lock;
 
@@ -19,17 +20,7 @@ const ORIGINS: &str = "softvt origins";
 /// Notes that the running call of the script makes `table`.
 pub(crate) fn record_origin(lua: &Lua, table: &Table) -> mlua::Result<()> {
     let Some(line) = current_line(lua) else { return Ok(()) };
-    let origins = match lua.named_registry_value::<Table>(ORIGINS) {
-        Ok(origins) => origins,
-        Err(_) => {
-            let (origins, weak) = (lua.create_table()?, lua.create_table()?);
-            weak.set("__mode", "k")?;
-            origins.set_metatable(Some(weak))?;
-            lua.set_named_registry_value(ORIGINS, &origins)?;
-            origins
-        }
-    };
-    origins.raw_set(table, line.to_string())
+    weak_table(lua, ORIGINS)?.raw_set(table, line.to_string())
 }
 
 /// Line of the key at `path` in the call that made `table`, or of that call.

@@ -40,7 +40,7 @@ pub(in super::super) struct FlatSample {
 }
 
 /// A point of the surface with little curvature.
-struct Seed {
+struct RegionStart {
     p: Vec3,
     normal: Vec3,
     /// Largest curvature, 1/m.
@@ -66,8 +66,8 @@ pub(super) fn flat_samples(
     sharp: &[Vec3],
     area: f64,
 ) -> Vec<FlatSample> {
-    let seeds: Vec<Seed> =
-        starts.iter().filter_map(|p| Seed::at(shape, p, CURVATURE_DISTANCE * step)).collect();
+    let seeds: Vec<RegionStart> =
+        starts.iter().filter_map(|p| RegionStart::at(shape, p, CURVATURE_DISTANCE * step)).collect();
     let mut samples = Vec::new();
     let is_free = |p: &Vec3, taken: &[FlatSample], apart: f64| taken.iter().all(|q| (q.p - p).norm() > apart);
     let mut inner: Vec<(Vec3, f64)> = seeds
@@ -100,7 +100,7 @@ pub(super) fn flat_samples(
     samples
 }
 
-impl Seed {
+impl RegionStart {
     /// The surface at `p`, if it is nearly flat within `distance` (m).
     fn at(shape: &Shape, p: &Vec3, distance: f64) -> Option<Self> {
         let p = project_to_surface(shape, *p);
@@ -119,7 +119,7 @@ impl Seed {
 }
 
 /// Groups seeds into plane faces. Feet in one plane form one face.
-fn plane_faces<'a>(shape: &'a Shape, seeds: &[Seed]) -> Vec<PlaneFace<'a>> {
+fn plane_faces<'a>(shape: &'a Shape, seeds: &[RegionStart]) -> Vec<PlaneFace<'a>> {
     let mut faces: Vec<PlaneFace> = Vec::new();
     for seed in seeds.iter().filter(|seed| seed.curvature < MAX_PLANE_CURVATURE) {
         let same = faces.iter_mut().find(|face| {

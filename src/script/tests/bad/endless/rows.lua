@@ -50,10 +50,6 @@ for i = 1, 1e9 do kept[i] = softvt.image { width = 4096, height = 4096, colour =
 local big, kept = softvt.image { width = 4096, height = 4096, colour = { 0, 0, 0 } }, {}
 for i = 1, 1e9 do kept[i] = big:crop { 0, 0, 4096, 4096 } end
 
-return softvt.image { width = 8192, height = 8192, colour = { 0, 0, 0 } }:resize(8191, 8192)
-
-softvt.image { width = 8192, height = 8192, colour = { 0, 0, 0 } }:text('a', { at = { 0, 9 }, colour = { 0, 0, 0 } })
-
 for i = 1, 12 do local p = softvt.image { width = 4096, height = 4096, colour = { 0, 0, 0 } } end
 return { released = true }
 

@@ -11,8 +11,6 @@ box:bend { along = 'x', towards = 'y', curvature = 40 }
 
 box:shell(0.01)
 
-softvt.shape.sphere { radius = 0.03 }:ridges { pitch = 1e-4, height = -0.0015 }
-
 softvt.shape.sphere { radius = 0.03 }:ridges { pitch = 1e-3, height = -0.0015 }
 
 softvt.shape.sphere { radius = -1 }
@@ -24,10 +22,6 @@ cube:subtract(ball:translate(0, 0, 17))
 cube:ridges { height = 0.003 }
 
 cube:paint { material = 1, region = ball:translate(0.2, 0, 0) }
-
-cube:ridges { height = 0.003, count = 8, mask = { axis = 'z', from = 4, to = 10 } }
-
-cube:bumps { height = 1e-3, radius = 1e-3, spacing = 4e-3, mask = { axis = 'z', from = 4, to = 10 } }
 
 softvt.soft { density = 200, youngs_pa = -1, poisson = 0.3 }
 
