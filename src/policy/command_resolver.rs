@@ -1,6 +1,6 @@
 //! [`CommandResolver`]: from the commands of a policy to the actions that the robot executes.
 
-use super::{Action, EncodedGrip, GripSwitch, Observation, ToolCommand, ToolMotion, WidthLatch, osc};
+use super::{Action, EncodedGrip, GripLatch, Observation, ToolCommand, ToolMotion, osc};
 use softvt_geometry::Vec3;
 use softvt_robot::{GripTarget, rotation};
 
@@ -11,8 +11,7 @@ pub struct CommandResolver {
     /// Velocities of the tool between two control steps, as the spring leaves them; zero after other commands.
     velocity: Vec3,
     angular_velocity: Vec3,
-    latch: WidthLatch,
-    switch: GripSwitch,
+    latch: GripLatch,
 }
 
 impl CommandResolver {
@@ -20,9 +19,9 @@ impl CommandResolver {
     pub fn resolve(&mut self, observation: &Observation, command: ToolCommand) -> Action {
         let grip = match command.grip {
             EncodedGrip::Target(target) => target,
-            EncodedGrip::TwoWidth(answer) => GripTarget::Closure(self.latch.closure(answer)),
+            EncodedGrip::TwoWidth(answer) => GripTarget::Closure(self.latch.two_width(answer)),
             EncodedGrip::Latched { closes, hold_steps } => {
-                GripTarget::Closure(self.switch.closure(closes, hold_steps))
+                GripTarget::Closure(self.latch.switched(closes, hold_steps))
             }
         };
         match command.motion {

@@ -1,11 +1,10 @@
-//! Grip codes whose closure depends on earlier answers: a gripper that is open or closed with hysteresis, and one that
-//! holds a width.
+//! Hysteresis of a gripper that is open or closed: the grip code two-width, and binary codes with two limits.
 
 use serde::{Deserialize, Serialize};
 
-/// Closure above which an answer closes an open gripper: a target width below 72 mm.
+/// Closure above which an answer in the code two-width closes an open gripper: a target width below 72 mm.
 const CLOSE_ABOVE: f64 = 0.1;
-/// Closure below which an answer opens a closed gripper: a target width above 76 mm.
+/// Closure below which it opens a closed gripper: a target width above 76 mm.
 const OPEN_BELOW: f64 = 0.05;
 /// Control steps after closing in which the width follows the answers: 0.5 s. A policy that learned two widths passes
 /// through those in between.
@@ -22,57 +21,50 @@ pub struct GripHysteresis {
     pub hold_steps: u32,
 }
 
-/// State of a gripper that is open or closed, with hysteresis: the decoder of SoftVTBench's release v0.2 for continuous
-/// answers. A change is kept for some control steps, whatever is answered.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct GripSwitch {
-    is_closed: bool,
-    /// Control steps for which the state is still kept.
-    held_steps: u32,
-}
-
-impl GripSwitch {
-    /// Commanded closure, 0 or 1, after the answer of the next control step: true closes, false opens, `None` changes
-    /// nothing.
-    pub fn closure(&mut self, closes: Option<bool>, hold_steps: u32) -> f64 {
-        if self.held_steps > 0 {
-            self.held_steps -= 1;
-        } else if let Some(is_closed) = closes.filter(|closes| *closes != self.is_closed) {
-            *self = Self { is_closed, held_steps: hold_steps.saturating_sub(1) };
-        }
-        f64::from(u8::from(self.is_closed))
-    }
-}
-
-/// Memory of the grip code two-width: a hand that is either open, or at the width that the policy gave when it closed.
-///
-/// The width follows the answers of the first 0.5 s after closing; the last of them is held until an answer opens the
-/// gripper.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct WidthLatch {
-    held: Option<HeldClosure>,
-}
-
+/// State of a gripper with hysteresis: open, or closed at a closure that is held.
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct HeldClosure {
-    closure: f64,
-    /// Control steps since closing.
+pub struct GripLatch {
+    /// Closure while closed.
+    held: Option<f64>,
+    /// Control steps since the last change.
     steps: u32,
 }
 
-impl WidthLatch {
-    /// Commanded closure after the answer of the next control step.
-    pub fn closure(&mut self, answer: f64) -> f64 {
-        self.held = match self.held {
-            None if answer > CLOSE_ABOVE => Some(HeldClosure { closure: answer, steps: 1 }),
-            None => None,
-            Some(_) if answer < OPEN_BELOW => None,
-            Some(HeldClosure { closure, steps }) => {
-                let closure = if steps < FOLLOW_STEPS { answer } else { closure };
-                Some(HeldClosure { closure, steps: steps.saturating_add(1) })
-            }
+impl Default for GripLatch {
+    /// Open for long.
+    fn default() -> Self {
+        Self { held: None, steps: u32::MAX }
+    }
+}
+
+impl GripLatch {
+    /// Commanded closure, 0 or 1, after the answer of the next control step: true closes, false opens, `None` changes
+    /// nothing. A change is kept for `hold_steps`.
+    pub fn switched(&mut self, closes: Option<bool>, hold_steps: u32) -> f64 {
+        self.advance(closes, 1.0, hold_steps, 0)
+    }
+
+    /// Commanded closure after the answer of the next control step in the code two-width. It follows the answers of the
+    /// first 0.5 s after closing; the last of them is held until an answer opens the gripper.
+    pub fn two_width(&mut self, answer: f64) -> f64 {
+        let closes = match answer {
+            _ if answer > CLOSE_ABOVE => Some(true),
+            _ if answer < OPEN_BELOW => Some(false),
+            _ => None,
         };
-        self.held.map_or(0.0, |held| held.closure)
+        self.advance(closes, answer, 0, FOLLOW_STEPS)
+    }
+
+    fn advance(&mut self, closes: Option<bool>, closure: f64, hold_steps: u32, follow_steps: u32) -> f64 {
+        self.steps = self.steps.saturating_add(1);
+        match closes {
+            Some(closes) if closes != self.held.is_some() && self.steps >= hold_steps => {
+                *self = Self { held: closes.then_some(closure), steps: 0 };
+            }
+            _ if self.held.is_some() && self.steps < follow_steps => self.held = Some(closure),
+            _ => {}
+        }
+        self.held.unwrap_or(0.0)
     }
 }
 
@@ -82,9 +74,9 @@ mod tests {
 
     #[test]
     fn a_change_is_kept_for_some_steps_and_then_until_an_answer_on_the_other_side() {
-        let mut switch = GripSwitch::default();
+        let mut latch = GripLatch::default();
         let mut run = |answers: &[Option<bool>]| -> Vec<f64> {
-            answers.iter().map(|closes| switch.closure(*closes, 3)).collect()
+            answers.iter().map(|closes| latch.switched(*closes, 3)).collect()
         };
         assert_eq!(run(&[None, Some(false)]), [0.0, 0.0]);
         assert_eq!(run(&[Some(true), Some(false), Some(false)]), [1.0; 3], "three steps at least");
@@ -94,16 +86,15 @@ mod tests {
 
     #[test]
     fn the_width_is_held_from_half_a_second_after_closing_until_an_answer_opens() {
-        let mut latch = WidthLatch::default();
-        let run = |latch: &mut WidthLatch, answers: &[f64]| -> Vec<f64> {
-            answers.iter().map(|answer| latch.closure(*answer)).collect()
-        };
-        assert_eq!(run(&mut latch, &[0.0, 0.02, 0.1]), [0.0; 3], "noise about zero keeps the gripper open");
+        let mut latch = GripLatch::default();
+        let mut run =
+            |answers: &[f64]| -> Vec<f64> { answers.iter().map(|answer| latch.two_width(*answer)).collect() };
+        assert_eq!(run(&[0.0, 0.02, 0.1]), [0.0; 3], "noise about zero keeps the gripper open");
         // A blend of both widths, then the width of the object.
-        assert_eq!(run(&mut latch, &[0.2, 0.3]), [0.2, 0.3]);
-        assert_eq!(run(&mut latch, &[0.42; 8]), [0.42; 8]);
-        assert_eq!(run(&mut latch, &[0.9, 0.06, 0.5]), [0.42; 3], "held, whatever is answered while closed");
-        assert_eq!(run(&mut latch, &[0.04, 0.08, 0.0]), [0.0; 3], "opened, and not closed by a small answer");
-        assert_eq!(run(&mut latch, &[0.55]), [0.55], "the next object has a width of its own");
+        assert_eq!(run(&[0.2, 0.3]), [0.2, 0.3]);
+        assert_eq!(run(&[0.42; 8]), [0.42; 8]);
+        assert_eq!(run(&[0.9, 0.06, 0.5]), [0.42; 3], "held, whatever is answered while closed");
+        assert_eq!(run(&[0.04, 0.08, 0.0]), [0.0; 3], "opened, and not closed by a small answer");
+        assert_eq!(run(&[0.55]), [0.55], "the next object has a width of its own");
     }
 }

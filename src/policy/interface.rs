@@ -122,9 +122,9 @@ pub enum ToolMotion {
 pub enum EncodedGrip {
     /// A target of the hand.
     Target(GripTarget),
-    /// The closure of an answer in the code two-width, see [`WidthLatch`](super::WidthLatch).
+    /// The closure of an answer in the code two-width, see [`GripLatch`](super::GripLatch).
     TwoWidth(f64),
-    /// Open or closed with the whole effort, with hysteresis, see [`GripSwitch`](super::GripSwitch).
+    /// Open or closed with the whole effort, with hysteresis, see [`GripLatch`](super::GripLatch).
     Latched {
         /// True to close, false to open, `None` to stay.
         closes: Option<bool>,

@@ -1,6 +1,7 @@
 //! Policies: their interface, their observations, the encodings of observations and actions, and policy servers.
 #![warn(missing_docs, unreachable_pub)]
 
+pub mod access;
 pub mod builtin;
 mod command_resolver;
 pub mod decode;
@@ -17,7 +18,7 @@ mod robot_state;
 pub mod transport;
 
 pub use command_resolver::CommandResolver;
-pub use grip_hysteresis::{GripHysteresis, GripSwitch, WidthLatch};
+pub use grip_hysteresis::{GripHysteresis, GripLatch};
 pub use interface::{
     Action, ActionChunk, EncodedGrip, EpisodeBrief, Policy, PolicyError, QueryId, ToolCommand, ToolMotion,
 };

@@ -12,7 +12,9 @@ use std::{
 
 use rmpv::Value;
 use tungstenite::{
-    Error, HandshakeError, Message, WebSocket, handshake::HandshakeRole, protocol::WebSocketConfig,
+    Error, HandshakeError, Message, WebSocket,
+    handshake::HandshakeRole,
+    protocol::{CloseFrame, WebSocketConfig, frame::coding::CloseCode},
 };
 
 use super::msgpack::pack;
@@ -159,6 +161,22 @@ pub fn send_frame<E>(
         sent = socket.flush();
     }
     sent.map_err(TransportError::Socket)
+}
+
+/// Sends a close frame. A write that was interrupted is repeated while `may_wait`.
+///
+/// # Errors
+/// The connection fails.
+pub fn close(
+    socket: &mut WebSocket<PollingStream>,
+    code: CloseCode,
+    may_wait: impl Fn() -> bool,
+) -> Result<(), Error> {
+    let mut sent = socket.close(Some(CloseFrame { code, reason: "".into() }));
+    while matches!(&sent, Err(Error::Io(error)) if would_block(error)) && may_wait() {
+        sent = socket.flush();
+    }
+    sent
 }
 
 /// Receives the next message of any kind, pings and pongs included. `on_wait` may send pings.

@@ -1,9 +1,8 @@
 //! The suites and settings of a server.
 
-use super::access::AccessRules;
 use softvt_benchmark::Suite;
 use softvt_common::episode_id::{EpisodeId, EpisodeSplit};
-use softvt_policy::{PolicyError, profile::Profile};
+use softvt_policy::{PolicyError, access::AccessRules, profile::Profile};
 use softvt_rollout::{Episode, EpisodeError, FinishedEpisode};
 
 /// A request cannot be executed. The message is sent to the client.

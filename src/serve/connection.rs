@@ -6,10 +6,7 @@ use std::{
 };
 
 use rmpv::Value;
-use tungstenite::{
-    Message, WebSocket,
-    protocol::{CloseFrame, frame::coding::CloseCode},
-};
+use tungstenite::{Message, WebSocket, protocol::frame::coding::CloseCode};
 
 use softvt_common::cancel::CancelFlag;
 use softvt_policy::{
@@ -115,13 +112,7 @@ impl<'a> Connection<'a> {
         let cancelled = || self.cancel.requested();
         let code = if cancelled() { CloseCode::Away } else { CloseCode::Normal };
         let deadline = Instant::now() + CLOSE_DRAIN_TIMEOUT;
-        let mut sent = self.socket.close(Some(CloseFrame { code, reason: "".into() }));
-        // The stream interrupts a write once per poll interval.
-        while matches!(&sent, Err(tungstenite::Error::Io(error)) if would_block(error))
-            && Instant::now() < deadline
-        {
-            sent = self.socket.flush();
-        }
+        let _ = transport::close(&mut self.socket, code, || Instant::now() < deadline);
         // The system would discard the last message if data remained unread.
         let stream = self.socket.get_mut();
         let mut discarded = vec![0; 1 << 16];

@@ -2,7 +2,6 @@
 //! is described in `docs/serve.md`.
 #![warn(missing_docs, unreachable_pub)]
 
-mod access;
 mod attempts;
 mod config;
 mod connection;
@@ -14,8 +13,7 @@ mod session;
 mod spaces;
 mod state;
 
-pub use access::AccessRules;
 pub use config::{EpisodeRecorder, RequestError, ServerConfig};
 pub use response::hello;
 pub use server::serve;
-pub use softvt_policy::http::listen;
+pub use softvt_policy::{access::AccessRules, http::listen};

@@ -17,7 +17,7 @@ use serde::de::DeserializeOwned;
 use serde_json::{Map, Value};
 use tungstenite::{
     Message as WebsocketMessage,
-    http::{HeaderName, Method, StatusCode, header},
+    http::{Method, StatusCode},
 };
 
 use crate::{
@@ -29,6 +29,7 @@ use crate::{
 };
 use softvt_common::cancel;
 use softvt_policy::{
+    access::{AccessRules, is_same_secret},
     http::{self, HttpRequest, Refusal},
     transport::send_frame,
 };
@@ -50,6 +51,7 @@ struct Page<'a> {
 /// Who may send requests.
 struct Access {
     address: SocketAddr,
+    rules: AccessRules,
     token: String,
 }
 
@@ -67,7 +69,8 @@ impl Watch {
     pub fn listen(port: u16, token: String) -> io::Result<Self> {
         let listener = http::listen(&Ipv4Addr::LOCALHOST.to_string(), port)?;
         let address = listener.local_addr()?;
-        Ok(Self { listener, access: Access { address, token } })
+        let rules = AccessRules::new("localhost", address, None);
+        Ok(Self { listener, access: Access { address, rules, token } })
     }
 
     /// Address of the page.
@@ -103,8 +106,8 @@ impl Page<'_> {
     fn answer(&self, mut request: HttpRequest) {
         let (method, url) = (request.head.method().clone(), request.head.uri().clone());
         let (path, query) = (url.path(), url.query().unwrap_or_default());
-        if !self.access.is_own_page(&request) {
-            return request.respond(StatusCode::FORBIDDEN, "requests of other pages are refused\n");
+        if let Err(Refusal { status, reason }) = self.access.rules.check(&request.head) {
+            return request.respond(status, &reason);
         }
         // The scripts of the page are the same for everybody.
         if let Some(file) = page::file(path).filter(|_| path != "/" || self.access.has_token(query)) {
@@ -152,25 +155,7 @@ impl Page<'_> {
 impl Access {
     fn has_token(&self, query: &str) -> bool {
         let given = query.split('&').find_map(|pair| pair.strip_prefix("token="));
-        // The time of the comparison does not depend on the first difference.
-        given.is_some_and(|given| {
-            given.len() == self.token.len()
-                && given.bytes().zip(self.token.bytes()).fold(0, |bits, (a, b)| bits | (a ^ b)) == 0
-        })
-    }
-
-    /// True if the request names this server as its host, and as its origin if it has one.
-    fn is_own_page(&self, request: &HttpRequest) -> bool {
-        let value = |name: HeaderName| {
-            let header = request.head.headers().get(name);
-            header.map(|header| String::from_utf8_lossy(header.as_bytes()).into_owned())
-        };
-        let port = self.address.port();
-        let own = ["127.0.0.1", "localhost"].map(|name| format!("{name}:{port}"));
-        let is_own = |host: &str| own.iter().any(|name| name == host);
-        let origin_is_own =
-            value(header::ORIGIN).is_none_or(|origin| origin.strip_prefix("http://").is_some_and(is_own));
-        origin_is_own && value(header::HOST).is_some_and(|host| is_own(&host))
+        given.is_some_and(|given| is_same_secret(given.as_bytes(), self.token.as_bytes()))
     }
 }
 

@@ -10,10 +10,8 @@ use std::{
 
 use rmpv::Value;
 use tungstenite::{
-    ClientRequestBuilder, Error, Message, WebSocket, client,
-    error::ProtocolError,
-    http::Uri,
-    protocol::{CloseFrame, frame::coding::CloseCode},
+    ClientRequestBuilder, Error, Message, WebSocket, client, error::ProtocolError, http::Uri,
+    protocol::frame::coding::CloseCode,
 };
 
 use softvt_common::cancel::CancelFlag;
@@ -274,23 +272,11 @@ impl Drop for PolicyConnection {
     fn drop(&mut self) {
         let _ = self.socket.get_mut().set_nonblocking(false);
         let deadline = Instant::now() + CLOSE_TIMEOUT;
-        let may_wait = || {
-            let is_over = Instant::now() > deadline || self.server.cancel.requested();
-            if is_over { Err(()) } else { Ok(()) }
-        };
-        let frame = CloseFrame { code: CloseCode::Normal, reason: "".into() };
-        let mut sent = self.socket.close(Some(frame));
-        while let Err(Error::Io(error)) = &sent
-            && would_block(error)
-            && may_wait().is_ok()
-        {
-            sent = self.socket.flush();
-        }
+        let may_wait = || Instant::now() <= deadline && !self.server.cancel.requested();
+        let on_wait = |_: &mut _| if may_wait() { Ok(()) } else { Err(()) };
+        let is_sent = transport::close(&mut self.socket, CloseCode::Normal, may_wait).is_ok();
         // The socket reports the end of the closing handshake as an error.
-        while sent.is_ok()
-            && transport::receive(&mut self.socket, |_| may_wait()).is_ok()
-            && may_wait().is_ok()
-        {}
+        while is_sent && may_wait() && transport::receive(&mut self.socket, on_wait).is_ok() {}
     }
 }
 

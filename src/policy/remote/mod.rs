@@ -112,7 +112,8 @@ impl Policy for RemotePolicy {
         let Some(connection) = &mut self.connection else { return Ok(()) };
         self.query.step = step_of(observation);
         let query = QueryId { wants_actions: false, ..self.query.clone() };
-        let sent = acknowledge_openpi(connection, observation, &query);
+        // Its reply says nothing.
+        let sent = ask_openpi(connection, observation, &query).map(drop);
         if sent.is_err() {
             self.connection = None;
         }
@@ -134,7 +135,8 @@ impl Policy for RemotePolicy {
         let mut connection = current.map_or_else(|| self.connections.take(), Ok)?;
         self.query.step = step_of(observation);
         let chunk = match protocol {
-            ServerProtocol::Openpi => infer_openpi(&mut connection, observation, &self.query),
+            ServerProtocol::Openpi => ask_openpi(&mut connection, observation, &self.query)
+                .and_then(|reply| decode::chunk(&reply, &connection.server.profile.actions)),
             ServerProtocol::VlaEval => vla_eval::infer(&mut connection, observation, &self.query),
         };
         self.query.query += 1;
@@ -198,64 +200,40 @@ fn observes_every_step(server: &PolicyServer, metadata: &Value) -> Result<bool, 
 /// They are not those of the profile.
 fn check_action_codes(server: &PolicyServer, metadata: &Value) -> Result<(), PolicyError> {
     let Profile { name, actions, .. } = &server.profile;
-    let stated = |key: &str, known: &[&str]| -> Result<Option<String>, PolicyError> {
-        let Some(value) = entry(metadata, key).filter(|value| !value.is_nil()) else { return Ok(None) };
-        let Some(bytes) = value.as_str().map(str::as_bytes).or(value.as_slice()) else {
-            let (found, known) = (kind(value), known.join(", "));
-            return Err(
-                server.error(&format!("has {found} as {key} in its metadata; expected one of {known}"))
-            );
+    let stated = |key: &str| {
+        let value = entry(metadata, key).filter(|value| !value.is_nil())?;
+        let bytes = value.as_str().map(str::as_bytes).or(value.as_slice());
+        let text = bytes.map(|bytes| String::from_utf8_lossy(bytes).chars().take(80).collect::<String>());
+        Some(text.ok_or_else(|| kind(value)))
+    };
+    let (codes, poses) = (GripCode::ALL.map(GripCode::name), PoseEncoding::NAMES);
+    for (key, known, own, what) in [
+        ("gripper", codes.as_slice(), actions.gripper.code.name(), "the grip code"),
+        ("pose", poses.as_slice(), actions.pose.name(), "actions of pose"),
+    ] {
+        let problem = match stated(key) {
+            Some(Ok(code)) if code == own => continue,
+            None => continue,
+            Some(Ok(code)) if known.contains(&code.as_str()) => format!(
+                "states {what} {code} in its metadata, and the profile {name} reads {own}: choose one that reads {code}"
+            ),
+            Some(Ok(code)) => format!(
+                "states {code:?} in the entry {key} of its metadata; expected one of {}",
+                known.join(", ")
+            ),
+            Some(Err(kind)) => {
+                format!("has {kind} as {key} in its metadata; expected one of {}", known.join(", "))
+            }
         };
-        Ok(Some(String::from_utf8_lossy(bytes).chars().take(80).collect()))
-    };
-    let unknown = |key: &str, stated: &str, known: &[&str]| {
-        let known = known.join(", ");
-        server
-            .error(&format!("states {stated:?} in the entry {key} of its metadata; expected one of {known}"))
-    };
-    if let Some(stated) = stated("gripper", &GripCode::ALL.map(GripCode::name))? {
-        let own = actions.gripper.code;
-        match GripCode::named(&stated) {
-            Some(code) if code == own => {}
-            Some(code) => {
-                return Err(server.error(&format!(
-                    "states the grip code {} in its metadata, and the profile {name} reads {}: choose the grip code {}",
-                    code.name(),
-                    own.name(),
-                    code.name()
-                )));
-            }
-            None => {
-                let known = GripCode::ALL.map(GripCode::name);
-                return Err(unknown("gripper", &stated, &known));
-            }
-        }
+        return Err(server.error(&problem));
     }
-    if let Some(stated) = stated("pose", &PoseEncoding::NAMES)? {
-        let own = actions.pose.name();
-        if !PoseEncoding::NAMES.contains(&stated.as_str()) {
-            return Err(unknown("pose", &stated, &PoseEncoding::NAMES));
-        }
-        if stated != own {
-            return Err(server.error(&format!(
-                "states actions of pose {stated} in its metadata, and the profile {name} reads {own}: choose a profile whose \
-                 actions have pose = {stated:?}"
-            )));
-        }
-    }
-    if actions.units.is_some() {
-        // The profile converts what the server answers.
-        return Ok(());
-    }
-    let text = |key: &str| {
-        let value = entry(metadata, key)?;
-        let bytes = value.as_str().map(str::as_bytes).or(value.as_slice())?;
-        Some(String::from_utf8_lossy(bytes).trim().to_lowercase())
-    };
+    // A profile with units converts what the server answers.
     for (key, others, own) in
         [("units", OTHER_UNITS, "m and rad"), ("rotation", OTHER_ROTATIONS, "axis_angle, in rad")]
     {
-        if let Some(stated) = text(key).filter(|stated| others.contains(&stated.as_str())) {
+        if let Some(Ok(stated)) = stated(key).filter(|_| actions.units.is_none())
+            && others.split(' ').any(|other| stated.trim().eq_ignore_ascii_case(other))
+        {
             return Err(server.error(&format!(
                 "states {stated:?} in the entry {key} of its metadata, and softvt reads {own}: convert them there, or \
                  choose a profile with units"
@@ -266,53 +244,13 @@ fn check_action_codes(server: &PolicyServer, metadata: &Value) -> Result<(), Pol
 }
 
 /// Units of length and angle that are not softvt's, as servers may state them.
-const OTHER_UNITS: &[&str] = &[
-    "mm",
-    "millimeter",
-    "millimeters",
-    "cm",
-    "centimeter",
-    "centimeters",
-    "inch",
-    "inches",
-    "deg",
-    "degree",
-    "degrees",
-];
+const OTHER_UNITS: &str =
+    "mm millimeter millimeters cm centimeter centimeters inch inches deg degree degrees";
 /// Codes of rotations that are not softvt's, as servers may state them.
-const OTHER_ROTATIONS: &[&str] = &[
-    "deg",
-    "degree",
-    "degrees",
-    "euler",
-    "euler_xyz",
-    "rpy",
-    "quat",
-    "quaternion",
-    "quaternion_xyzw",
-    "quaternion_wxyz",
-    "rot6d",
-];
+const OTHER_ROTATIONS: &str =
+    "deg degree degrees euler euler_xyz rpy quat quaternion quaternion_xyzw quaternion_wxyz rot6d";
 
-/// openpi's protocol: sends an observation and receives a chunk of actions.
-fn infer_openpi(
-    connection: &mut PolicyConnection,
-    observation: &Observation,
-    query: &QueryId,
-) -> Result<ActionChunk, PolicyError> {
-    let response = ask_openpi(connection, observation, query)?;
-    decode::chunk(&response, &connection.server.profile.actions)
-}
-
-/// openpi's protocol: sends an observation for the history of the policy. Its reply says nothing.
-fn acknowledge_openpi(
-    connection: &mut PolicyConnection,
-    observation: &Observation,
-    query: &QueryId,
-) -> Result<(), PolicyError> {
-    ask_openpi(connection, observation, query).map(|_| ())
-}
-
+/// openpi's protocol: sends an observation and receives its reply.
 fn ask_openpi(
     connection: &mut PolicyConnection,
     observation: &Observation,

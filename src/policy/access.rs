@@ -11,7 +11,7 @@ use tungstenite::{
     http::{HeaderMap, StatusCode, Uri, header},
 };
 
-use softvt_policy::http::Refusal;
+use super::http::Refusal;
 
 /// The rules of a server.
 #[derive(Clone, Debug)]
@@ -31,8 +31,11 @@ impl AccessRules {
         Self { host, address: address.ip(), token }
     }
 
-    /// Checks the headers of a handshake.
-    pub(super) fn check(&self, request: &Request) -> Result<(), Refusal> {
+    /// Checks the headers of a request.
+    ///
+    /// # Errors
+    /// It comes from a page of another site, names another server, or lacks the token.
+    pub fn check(&self, request: &Request) -> Result<(), Refusal> {
         let headers = request.headers();
         let host = text(headers, &header::HOST).unwrap_or_default();
         // Programs send no origin, or that of the server itself.
@@ -99,11 +102,15 @@ fn is_same_site(headers: &HeaderMap, host: &str) -> bool {
 }
 
 fn is_authorized(headers: &HeaderMap, token: &str) -> bool {
-    let Some(value) = headers.get(header::AUTHORIZATION) else { return false };
     let expected = format!("Bearer {token}");
-    let (value, expected) = (value.as_bytes(), expected.as_bytes());
-    // The time of the comparison does not depend on the first difference.
-    value.len() == expected.len() && value.iter().zip(expected).fold(0, |all, (a, b)| all | (a ^ b)) == 0
+    headers
+        .get(header::AUTHORIZATION)
+        .is_some_and(|value| is_same_secret(value.as_bytes(), expected.as_bytes()))
+}
+
+/// Compares two secrets. The time does not depend on the first difference.
+pub fn is_same_secret(a: &[u8], b: &[u8]) -> bool {
+    a.len() == b.len() && a.iter().zip(b).fold(0, |bits, (a, b)| bits | (a ^ b)) == 0
 }
 
 #[cfg(test)]
