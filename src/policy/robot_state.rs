@@ -327,23 +327,19 @@ pub static ROBOT_STREAMS: &[RobotStream] = {
     ]
 };
 
-/// Numbers of streams with a part, and with a field.
-const NAME_COUNTS: [usize; 2] = {
-    let (mut parts, mut fields, mut index) = (0, 0, 0);
+const PART_COUNT: usize = {
+    let (mut count, mut index) = (0, 0);
     while index < ROBOT_STREAMS.len() {
-        parts += ROBOT_STREAMS[index].part.is_some() as usize;
-        fields += ROBOT_STREAMS[index].field.is_some() as usize;
+        count += ROBOT_STREAMS[index].part.is_some() as usize;
         index += 1;
     }
-    [parts, fields]
+    count
 };
 
 impl RobotStream {
-    /// Number of streams that are fields of observations in Lua.
-    pub const FIELDS: usize = NAME_COUNTS[1];
     /// Names of all parts of a profile's state.
     pub const PARTS: &[&str] = &{
-        let mut names = [""; NAME_COUNTS[0]];
+        let mut names = [""; PART_COUNT];
         let (mut at, mut index) = (0, 0);
         while index < ROBOT_STREAMS.len() {
             if let Some(name) = ROBOT_STREAMS[index].part {
@@ -365,7 +361,7 @@ impl RobotStream {
 }
 
 /// A part of a profile's state: a stream with a name among the parts.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Debug)]
 pub struct StatePart(&'static RobotStream);
 
 impl StatePart {
@@ -382,12 +378,6 @@ impl StatePart {
     /// Its name.
     pub fn name(self) -> &'static str {
         self.0.part.unwrap_or_default()
-    }
-}
-
-impl std::fmt::Debug for StatePart {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.write_str(self.name())
     }
 }
 

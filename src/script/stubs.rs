@@ -240,7 +240,7 @@ fn setting_details(setting: &Setting) -> String {
 fn stub_class(out: &mut String, class: &Class) {
     let _ = writeln!(out, "---{}\n---@class {}", class.doc.trim(), class.name);
     for field in class.all_fields() {
-        let (ty, doc) = class_field(field);
+        let (ty, doc) = class_field(&field);
         let _ = writeln!(out, "---@field {} {ty} {doc}", field.name);
     }
     let short = class.short_name();
@@ -282,7 +282,7 @@ pub fn reference() -> String {
     for class in api::CLASSES {
         let _ = writeln!(out, "\n### {}\n\n{}\n", class.name, class.doc.trim());
         for field in class.all_fields() {
-            let (ty, doc) = class_field(field);
+            let (ty, doc) = class_field(&field);
             let writable = if matches!(field.access, Access::Write(_)) { ", writable" } else { "" };
             let _ = writeln!(out, "- `{}` ({}{writable}): {doc}", field.name, cell(&ty));
         }

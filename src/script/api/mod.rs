@@ -51,7 +51,7 @@ static LIST: Class = Class {
           and table.concat work on it, and it is accepted wherever a list is expected. Numbers of a writable field can be \
           written one by one: scene.base[1] = 0.1 has the effect of scene.base = { 0.1, 0, 0 }. Any other list is read-only.",
     fields: &[],
-    declared: &[],
+    declared: Vec::new,
     methods: &[],
 };
 

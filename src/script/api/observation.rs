@@ -58,20 +58,13 @@ fn robot_fields() -> impl Iterator<Item = (&'static RobotStream, &'static str)> 
     ROBOT_STREAMS.iter().filter_map(|stream| Some((stream, stream.field?)))
 }
 
-const ROBOT_FIELDS: &[LuaField] = &{
-    let mut fields = [LuaField { name: "", access: Access::Read("", None), doc: "" }; RobotStream::FIELDS];
-    let (mut at, mut index) = (0, 0);
-    while index < ROBOT_STREAMS.len() {
-        let stream = &ROBOT_STREAMS[index];
-        if let Some(name) = stream.field {
-            let lua_type = if stream.width == 1 { "number" } else { "number[]" };
-            fields[at] = LuaField { name, access: Access::Read(lua_type, None), doc: stream.about };
-            at += 1;
-        }
-        index += 1;
-    }
-    fields
-};
+fn robot_field_list() -> Vec<LuaField> {
+    let field = |(stream, name): (&RobotStream, _)| {
+        let lua_type = if stream.width == 1 { "number" } else { "number[]" };
+        LuaField { name, access: Access::Read(lua_type, None), doc: stream.about }
+    };
+    robot_fields().map(field).collect()
+}
 
 /// The error for data that was not computed, since the policy does not declare it.
 fn not_observed(lua: &Lua, key: &str, declaration: &str) -> mlua::Error {
@@ -146,7 +139,7 @@ class! {
                 }
             }
         }
-        declared ROBOT_FIELDS { get(lua, this, index) { this.robot_stream(lua, index)? } }
+        declared robot_field_list { get(lua, this, index) { this.robot_stream(lua, index)? } }
         methods {
             /// Returns the image of a camera in observes.cameras, 224 × 224 unless the scene defines another size.
             fn camera(lua, this, name: String) -> ["softvt.Image"] {

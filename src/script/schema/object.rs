@@ -21,7 +21,7 @@ pub(crate) struct Class {
     pub doc: &'static str,
     pub fields: &'static [LuaField],
     /// Fields that are read-only and declared elsewhere, such as the streams of the robot.
-    pub declared: &'static [LuaField],
+    pub declared: fn() -> Vec<LuaField>,
     pub methods: &'static [Signature],
 }
 
@@ -48,8 +48,8 @@ impl Class {
     }
 
     /// All fields.
-    pub(crate) fn all_fields(&self) -> impl Iterator<Item = &'static LuaField> + Clone + use<> {
-        self.fields.iter().chain(self.declared)
+    pub(crate) fn all_fields(&self) -> impl Iterator<Item = LuaField> + Clone + use<> {
+        self.fields.iter().copied().chain((self.declared)())
     }
 
     fn keys(&self) -> impl Iterator<Item = &'static str> + Clone + use<> {
@@ -197,7 +197,7 @@ pub(crate) trait ApiObject: Clone + Send + Sync + UserData + FromLua + 'static {
 ///             name: "LuaCATS type" { get(lua, this) { … } }
 ///             name: "LuaCATS type" or "how to change it instead" { get(lua, this) { … } }
 ///         }
-///         declared FIELDS { get(lua, this, index) { … } }          // read-only, declared elsewhere
+///         declared list_of_fields { get(lua, this, index) { … } }          // read-only, declared elsewhere
 ///         writable {
 ///             /// Documentation.
 ///             name: Type::… => path.to.field;                  // of the target of RustType::read and RustType::change
@@ -276,7 +276,7 @@ macro_rules! class {
                         doc: concat!($($write_doc),+),
                     },)*)?
                 ],
-                declared: $crate::schema::convert::first!($($declared,)? &[]),
+                declared: $crate::schema::convert::first!($($declared,)? Vec::new),
                 methods: &[
                     $($($crate::schema::function::signature!(
                         [$($method_doc)*] $method($($arg : $arg_type $(= $arg_lua)?),*)

@@ -42,7 +42,7 @@ macro_rules! output {
                     access: $crate::schema::object::Access::Read($field_type, None),
                     doc: concat!($($field_doc),+),
                 }),*],
-                declared: &[],
+                declared: Vec::new,
                 methods: &[],
             };
         }
