@@ -28,7 +28,8 @@ pub(crate) struct StreamSpec {
     /// Path below the demonstration, with [`NAME`] for the name of an object.
     pub path: &'static str,
     pub number_type: NumberType,
-    pub row: RowShape,
+    /// Shape per step; lengths that differ between recordings are `None`.
+    pub row: Vec<Option<usize>>,
     /// Largest magnitude of a number.
     pub bound: f64,
     pub presence: Presence,
@@ -37,21 +38,6 @@ pub(crate) struct StreamSpec {
     /// Row of `docs/data.md`.
     pub about: &'static str,
     read: Read,
-}
-
-/// Shape per step.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum RowShape {
-    /// These lengths; none for a scalar.
-    Fixed(&'static [usize]),
-    /// One axis of this length.
-    Vector(usize),
-    /// (height, width, 3).
-    Image,
-    /// (height, width).
-    Depth,
-    /// (nodes, 3).
-    Nodes,
 }
 
 /// Recordings that have a stream.
@@ -180,38 +166,28 @@ impl StreamSpec {
         matches!(self.read, Read::Rendered)
     }
 
-    /// Shape of all rows; a length that is not fixed is `None`.
-    pub(crate) fn row_shape(&self) -> Vec<Option<usize>> {
-        match self.row {
-            RowShape::Fixed(lengths) => lengths.iter().copied().map(Some).collect(),
-            RowShape::Vector(length) => vec![Some(length)],
-            RowShape::Image => vec![None, None, Some(3)],
-            RowShape::Depth => vec![None, None],
-            RowShape::Nodes => vec![None, Some(3)],
-        }
+    /// True for depth, which is infinite in the background.
+    pub(crate) fn is_depth(&self) -> bool {
+        self.is_rendered() && self.number_type == NumberType::F32
     }
 
     /// Shape of the stream, in words.
     pub(crate) fn shape_text(&self) -> String {
-        match self.row {
-            RowShape::Fixed(lengths) => {
-                let lengths: String = lengths.iter().map(|length| format!(", {length}")).collect();
-                format!("(T{lengths})")
-            }
-            RowShape::Vector(length) => format!("(T, {length})"),
-            RowShape::Image => "(T, height, width, 3)".to_owned(),
-            RowShape::Depth => "(T, height, width)".to_owned(),
-            RowShape::Nodes => "(T, N, 3)".to_owned(),
-        }
+        let mut open = if self.is_rendered() { ["height", "width"].iter() } else { ["N"].iter() };
+        let length = |length: &Option<usize>| match length {
+            Some(length) => format!(", {length}"),
+            None => format!(", {}", open.next().unwrap_or(&"…")),
+        };
+        format!("(T{})", self.row.iter().map(length).collect::<String>())
     }
 
     /// The stream of these numbers of so many steps.
     fn stream(&self, path: String, steps: usize, numbers: Vec<f64>) -> DataStream {
-        let fixed: usize = self.row_shape().into_iter().flatten().product();
+        let fixed: usize = self.row.iter().flatten().product();
         let nodes = numbers.len() / (steps * fixed).max(1);
         DataStream {
             name: path,
-            row_shape: self.row_shape().into_iter().map(|length| length.unwrap_or(nodes)).collect(),
+            row_shape: self.row.iter().map(|length| length.unwrap_or(nodes)).collect(),
             values: StreamValues::new(self.number_type, numbers),
             attributes: self
                 .attributes
@@ -223,11 +199,15 @@ impl StreamSpec {
 }
 
 /// A stream that every recording has.
-fn spec(path: &'static str, row: &'static [usize], read: fn(&Rollout<'_>) -> Option<Vec<f64>>) -> StreamSpec {
+fn always(
+    path: &'static str,
+    row: &'static [usize],
+    read: fn(&Rollout<'_>) -> Option<Vec<f64>>,
+) -> StreamSpec {
     StreamSpec {
         path,
         number_type: NumberType::F64,
-        row: RowShape::Fixed(row),
+        row: row.iter().copied().map(Some).collect(),
         bound: f64::INFINITY,
         presence: Presence::Always,
         attributes: Vec::new(),
@@ -237,8 +217,8 @@ fn spec(path: &'static str, row: &'static [usize], read: fn(&Rollout<'_>) -> Opt
 }
 
 /// A stream that not every recording has, read in another way.
-fn possible(path: &'static str, row: RowShape, read: Read) -> StreamSpec {
-    StreamSpec { row, read, presence: Presence::Possible, ..spec(path, &[], |_| None) }
+fn read_by(path: &'static str, row: &[Option<usize>], read: Read) -> StreamSpec {
+    StreamSpec { row: row.to_vec(), read, presence: Presence::Possible, ..always(path, &[], |_| None) }
 }
 
 /// A stream that not every recording has.
@@ -247,7 +227,7 @@ fn sometimes(
     row: &'static [usize],
     read: fn(&Rollout<'_>) -> Option<Vec<f64>>,
 ) -> StreamSpec {
-    StreamSpec { presence: Presence::Possible, ..spec(path, row, read) }
+    StreamSpec { presence: Presence::Possible, ..always(path, row, read) }
 }
 
 impl StreamSpec {
@@ -286,7 +266,7 @@ fn of_robot(stream: &'static RobotStream) -> Option<StreamSpec> {
     let attributes = [("unit", stream.unit), ("frame", recorded.frame), ("meaning", recorded.meaning)];
     let presence = recorded.flag.map_or(Presence::Always, Presence::Flag);
     let attributes = attributes.into_iter().filter(|(_, text)| !text.is_empty()).collect();
-    let own = possible(recorded.path, RowShape::Vector(stream.width), Read::Robot(stream.read));
+    let own = read_by(recorded.path, &[Some(stream.width)], Read::Robot(stream.read));
     let own = own.number_type(recorded.number_type).bound(stream.bound).about(stream.about);
     Some(StreamSpec { presence, attributes, ..own })
 }
@@ -295,7 +275,7 @@ fn of_robot(stream: &'static RobotStream) -> Option<StreamSpec> {
 fn top_level() -> Vec<StreamSpec> {
     let action = |code: GripCode, gripper, read| {
         let unit = if code == GripCode::Force { "m, rad, N" } else { "m, rad, 1" };
-        let spec = spec(actions_in(code), &[7], read).unit(unit).frame(BASE).meaning(ACTION);
+        let spec = always(actions_in(code), &[7], read).unit(unit).frame(BASE).meaning(ACTION);
         let bound = if code == GripCode::Force { MAX_LOAD } else { MAX_ANGLE };
         spec.attribute("gripper", gripper).attribute("grip_code", code.name()).bound(bound)
     };
@@ -332,7 +312,7 @@ fn top_level() -> Vec<StreamSpec> {
              pads. Until it first reaches its median over the closed steps, the label is that median, since the hand closes \
              to it",
         ),
-        spec(JOINT_ACTIONS, &[ARM_DOFS], |rollout| {
+        always(JOINT_ACTIONS, &[ARM_DOFS], |rollout| {
             Some(rollout.finished.joint_commands.iter().flatten().copied().collect())
         })
         .unit("rad")
@@ -364,9 +344,9 @@ fn top_level() -> Vec<StreamSpec> {
             "axis-angle of the actions as commanded, rad, which may change sign at half a turn; only where `actions` differ. \
              Replays start from it",
         ),
-        spec("rewards", &[], |rollout| Some(rollout.is_last())).about("1 in the last step"),
-        spec("dones", &[], |rollout| Some(rollout.is_last())).number_type(NumberType::U8).about("1 in the last step"),
-        spec("timestamps", &[], |rollout| {
+        always("rewards", &[], |rollout| Some(rollout.is_last())).about("1 in the last step"),
+        always("dones", &[], |rollout| Some(rollout.is_last())).number_type(NumberType::U8).about("1 in the last step"),
+        always("timestamps", &[], |rollout| {
             Some((0..rollout.steps()).map(|step| step as f64 * CONTROL_DT).collect())
         })
         .unit("s")
@@ -377,7 +357,7 @@ fn top_level() -> Vec<StreamSpec> {
 /// Observations other than images and the robot's own state.
 fn observed() -> Vec<StreamSpec> {
     let camera = |index: usize, path| {
-        let pose = possible(path, RowShape::Fixed(&[7]), Read::Camera(index)).unit("m, 1").frame(BASE);
+        let pose = read_by(path, &[Some(7)], Read::Camera(index)).unit("m, 1").frame(BASE);
         pose.meaning(CAMERA_POSE).bound(MAX_DISTANCE_M).about(
             "pose of the camera, base, with OpenGL's axes (x right, y up, view along −z); the attribute `intrinsic` is the \
              matrix for the recorded images, for OpenCV's axes: JSON as text, see below",
@@ -386,7 +366,7 @@ fn observed() -> Vec<StreamSpec> {
     vec![
         camera(0, "obs/agentview_pose"),
         camera(1, "obs/eye_in_hand_pose"),
-        spec(MARKER_MOTION, &MARKER_ROW, |rollout| {
+        always(MARKER_MOTION, &MARKER_ROW, |rollout| {
             let numbers = rollout.markers.iter().flatten().flat_map(Markers::to_array);
             Some(numbers.flatten().flatten().map(f64::from).collect())
         })
@@ -405,11 +385,11 @@ fn images() -> Vec<StreamSpec> {
             true => "240 × 320, without markers",
             false => "224 × 224 by default, rows from the top, sRGB",
         };
-        let image = possible(path, RowShape::Image, Read::Rendered).number_type(NumberType::U8);
+        let image = read_by(path, &[None, None, Some(3)], Read::Rendered).number_type(NumberType::U8);
         image.attribute("axes", "step, row from the top, column, RGB (sRGB)").about(about)
     };
     let depth = |path| {
-        let depth = possible(path, RowShape::Depth, Read::Rendered).number_type(NumberType::F32).unit("m");
+        let depth = read_by(path, &[None, None], Read::Rendered).number_type(NumberType::F32).unit("m");
         let depth = depth.attribute("axes", "step, row from the top, column").bound(MAX_DEPTH_M).about(
             "depth along the optical axis, m; infinite in the background. About 25 kB per step of the static camera and \
              50 kB of the wrist camera, compressed",
@@ -485,9 +465,9 @@ fn privileged() -> Vec<StreamSpec> {
         .unit("m")
         .frame("world")
         .about("edges of the bounding box, m"),
-        possible(
+        read_by(
             "privileged/states/deformable_object/<name>/nodal_pos_w",
-            RowShape::Nodes,
+            &[None, Some(3)],
             Read::Bodies(|body| match body {
                 BodyConfiguration::Nodes(nodes) => Some(nodes.iter().flatten().copied().collect()),
                 BodyConfiguration::Pose(_) => None,
@@ -498,9 +478,9 @@ fn privileged() -> Vec<StreamSpec> {
         .frame("world")
         .bound(MAX_DISTANCE_M)
         .about("m, world"),
-        possible(
+        read_by(
             "privileged/states/rigid_object/<name>/root_pose_w",
-            RowShape::Fixed(&[7]),
+            &[Some(7)],
             Read::Bodies(|body| match body {
                 BodyConfiguration::Nodes(_) => None,
                 BodyConfiguration::Pose(pose) => Some(pose_row(pose).to_vec()),

@@ -18,7 +18,7 @@ use super::{
     card::DatasetCard,
     layout::{CARD, MANIFEST, TaskPaths},
     manifest::{self, ManifestEntry},
-    streams::{self, Presence, RowShape, StreamSpec},
+    streams::{self, Presence, StreamSpec},
 };
 use softvt_benchmark::CONTROL_HZ;
 use softvt_common::{files::FileError, text::counted};
@@ -278,7 +278,7 @@ impl DemoCheck<'_> {
         }
         let is_possible = |x: f64| match spec {
             // Depth is infinite in the background.
-            Some(spec) if spec.row == RowShape::Depth => x > 0.0 && (x <= spec.bound || x.is_infinite()),
+            Some(spec) if spec.is_depth() => x > 0.0 && (x <= spec.bound || x.is_infinite()),
             Some(spec) => x.is_finite() && x.abs() <= spec.bound,
             None => x.is_finite(),
         };
@@ -353,7 +353,7 @@ impl DemoCheck<'_> {
 
 /// Type and shape that a stream should have, if it has others.
 fn declaration_mismatch(spec: &StreamSpec, stream: &DataStream) -> Option<String> {
-    let (expected, got) = (spec.row_shape(), &stream.row_shape);
+    let (expected, got) = (&spec.row, &stream.row_shape);
     let fits = expected.len() == got.len()
         && expected.iter().zip(got).all(|(expected, got)| expected.is_none_or(|expected| expected == *got));
     if fits && stream.values.number_type() == spec.number_type {

@@ -38,11 +38,11 @@ fn demonstration(salt: f64) -> Demonstration {
             "obs/state" => row(step, 0.03),
             "obs/arm_joint_pos" | "actions_joints" => posture(step).to_vec(),
             path if path.starts_with("actions") => row(step, 0.0),
-            _ => vec![0.0; spec.row_shape().into_iter().flatten().product()],
+            _ => vec![0.0; spec.row.iter().flatten().product()],
         }
     };
     let of = |spec: &StreamSpec| {
-        let row_shape: Vec<usize> = spec.row_shape().into_iter().flatten().collect();
+        let row_shape: Vec<usize> = spec.row.iter().flatten().copied().collect();
         let numbers = (0..STEPS).flat_map(|step| numbers(spec, step)).collect();
         stream(spec.path, spec.number_type, &row_shape, numbers)
     };

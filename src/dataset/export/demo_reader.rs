@@ -106,7 +106,7 @@ impl DemoReader {
         IMAGES
             .into_iter()
             .zip(hashes)
-            .try_for_each(|(name, hash)| self.file.check_digest(self.demo, name, &hex(&hash.finalize())))
+            .try_for_each(|(name, hash)| self.file.check_digest(self.demo, name, || hex(&hash.finalize())))
     }
 
     fn check_shape(&self, name: &str, row_shape: &[usize]) -> Result<(), DatasetError> {

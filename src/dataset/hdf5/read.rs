@@ -285,7 +285,7 @@ impl TaskFile {
                 attributes.push((attribute, text));
             }
         }
-        self.check_digest(demo, name, &values.sha256())?;
+        self.check_digest(demo, name, || values.sha256())?;
         let row_shape = data.shape().get(1..).unwrap_or_default().to_vec();
         Ok(DataStream { name: name.to_owned(), row_shape, values, attributes })
     }
@@ -294,10 +294,15 @@ impl TaskFile {
     ///
     /// # Errors
     /// The stream was changed after it was recorded.
-    pub(crate) fn check_digest(&self, demo: usize, name: &str, digest: &str) -> Result<(), DatasetError> {
+    pub(crate) fn check_digest(
+        &self,
+        demo: usize,
+        name: &str,
+        digest: impl FnOnce() -> String,
+    ) -> Result<(), DatasetError> {
         let data = self.dataset(demo, name)?;
         let recorded = data.attr(DIGEST).and_then(|attribute| attribute.read_string());
-        match recorded.is_ok_and(|recorded| recorded != digest) {
+        match recorded.is_ok_and(|recorded| recorded != digest()) {
             true => Err(self.error(
                 demo,
                 name,
