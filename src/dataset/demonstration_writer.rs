@@ -168,7 +168,7 @@ impl ImageStreamWriter {
 
 /// Writers that take one image per step.
 struct ImageOutputs {
-    /// Those of images, if they are stored, then those of depth.
+    /// Images, if they are stored, then depth.
     streams: Vec<ImageStreamWriter>,
     stores_images: bool,
     videos: Vec<VideoWriter>,

@@ -5,8 +5,7 @@ use std::sync::LazyLock;
 use clap::{ValueEnum, builder::PossibleValue};
 use serde::{Deserialize, Deserializer, Serialize, Serializer, de::Error};
 
-use sha2::{Digest, Sha256};
-use softvt_common::text::hex;
+use softvt_common::digest::sha256_hex;
 use softvt_policy::{NumberType, ROBOT_STREAMS};
 use softvt_runs::record::EpisodeRecord;
 
@@ -113,13 +112,11 @@ impl StreamValues {
 
     /// SHA-256 of the numbers in little endian, hexadecimal.
     pub(super) fn sha256(&self) -> String {
-        let mut hash = Sha256::new();
         match self {
-            Self::F64(values) => values.iter().for_each(|x| hash.update(x.to_le_bytes())),
-            Self::F32(values) => values.iter().for_each(|x| hash.update(x.to_le_bytes())),
-            Self::U8(values) => hash.update(values),
+            Self::F64(values) => sha256_hex(values.iter().flat_map(|x| x.to_le_bytes()).collect::<Vec<u8>>()),
+            Self::F32(values) => sha256_hex(values.iter().flat_map(|x| x.to_le_bytes()).collect::<Vec<u8>>()),
+            Self::U8(values) => sha256_hex(values),
         }
-        hex(&hash.finalize())
     }
 
     /// Their type.

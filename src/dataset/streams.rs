@@ -93,7 +93,7 @@ pub(crate) const DEPTHS: [&str; 2] = ["obs/agentview_depth", "obs/eye_in_hand_de
 pub(crate) const DEPTH_FLAG: &str = "depth";
 /// Name of the stream of actions as joint positions.
 pub(crate) const JOINT_ACTIONS: &str = "actions_joints";
-/// Name of the stream of the rotation vectors as commanded, rad; present if those of the actions are others.
+/// Name of the stream of the rotation vectors as commanded, rad; present if `actions` has others.
 pub(crate) const COMMANDED_ROTATIONS: &str = "commanded_rotations";
 /// Name of the stream that marks actions that commanded joint positions; present if there are any.
 pub(crate) const COMMANDS_JOINTS: &str = "commands_joints";
@@ -586,7 +586,7 @@ impl<'a> Rollout<'a> {
         Some(stream)
     }
 
-    /// All streams but those that are rendered. The true state is left out unless it is asked for, and so are streams
+    /// All streams but images and depth. The true state is left out unless it is asked for, and so are streams
     /// with a flag that is not among `flags`.
     pub(crate) fn streams(&self, has_privileged: bool, flags: impl Fn(&str) -> bool) -> Vec<DataStream> {
         let is_wanted = |spec: &StreamSpec| match spec.presence {
@@ -644,7 +644,7 @@ fn phrase(sentence: &str) -> String {
     first.map_or(text.to_owned(), |first| format!("{}{}", first.to_lowercase(), &text[first.len_utf8()..]))
 }
 
-/// The tables of `docs/data.md`, by name: streams of every recording, those with a flag, and the true state.
+/// The tables of `docs/data.md`, by name: usual streams, streams with a flag, and the true state.
 pub fn stream_tables() -> [(&'static str, String); 3] {
     let table = |is_in: &dyn Fn(&StreamSpec) -> bool, prefix: &str| {
         let row = |spec: StreamSpec| {

@@ -351,7 +351,7 @@ impl RobotStream {
         names
     };
 
-    /// The streams that recordings have if this flag, a value of `--streams`, is given; `None` for those that all have.
+    /// The streams that recordings have with this value of `--streams`; without one, the streams of all recordings.
     pub fn recorded_with(
         flag: Option<&str>,
     ) -> impl Iterator<Item = (&'static Self, &'static RecordedStream)> {

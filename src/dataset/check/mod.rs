@@ -42,7 +42,7 @@ pub struct CheckReport {
 /// Tolerance of rotations and of the lengths of quaternions.
 const TOLERANCE: f64 = 1e-6;
 
-/// What is read for a check.
+/// Extent of a check.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum CheckScope {
     /// All files and streams.
@@ -131,7 +131,7 @@ fn check_entry(report: &mut CheckReport, file: &TaskFile, entry: &ManifestEntry)
     }
 }
 
-/// HDF5 files beside those that the manifest names.
+/// HDF5 files that the manifest does not name.
 fn stray_files(root: &Path, named: &BTreeMap<&str, Vec<&ManifestEntry>>) -> Vec<PathBuf> {
     let known: BTreeSet<PathBuf> = named.keys().map(|path| root.join(path)).collect();
     let folders: BTreeSet<&Path> = known.iter().filter_map(|path| path.parent()).collect();
@@ -253,7 +253,7 @@ impl DemoCheck<'_> {
         self.report.problems.push(self.file.error(self.demo, name, what).to_string());
     }
 
-    /// Checks that the attributes of the demonstration are those of its record, and that its length is.
+    /// Checks the attributes and the length of the demonstration against its record.
     fn check_attributes(&mut self) {
         let (file, demo) = (self.file, self.demo);
         let Some(record) = self.report.take(file.record(demo)) else { return };

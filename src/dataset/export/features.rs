@@ -6,7 +6,7 @@ use super::{ArmControl, ExportJob, selection::ImageSize};
 use softvt_policy::{JOINT_NAMES, ROBOT_STREAMS, profile::GripCode};
 use softvt_sensing::tactile::MARKER_COUNT;
 
-/// Shape of the markers of a row: initial positions, those of the previous step and of this one; both fingers; x and y.
+/// Shape of the markers of a row: initial, previous and present positions; both fingers; x and y.
 pub(super) const MARKER_SHAPE: [usize; 3] = [3, 2 * MARKER_COUNT, 2];
 /// Numbers of the markers in a row.
 pub(super) const MARKER_ROW: usize = MARKER_SHAPE[0] * MARKER_SHAPE[1] * MARKER_SHAPE[2];
@@ -29,7 +29,7 @@ pub(super) struct Feature {
 /// Kind of the content of a feature.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Content {
-    /// The image of this index: those of both cameras, and the mosaic of the fingers.
+    /// An image: 0 and 1 of the cameras, 2 for the mosaic of the fingers.
     Image(usize),
     /// A vector of observed numbers.
     Vector,
