@@ -2,21 +2,24 @@
 
 use std::{collections::BTreeMap, fs, path::Path};
 
-use softvt::media::svg::{self, Anchor, Place, at, circle, line, text};
+use softvt::media::{
+    drawing::{Anchor, Element, Font, Place, Stroke, Symbol, Tone, at, line, styled_text, text},
+    svg,
+};
 
 /// The image, and the page with the claims, from the root of the repository.
 pub const IMAGE: &str = "docs/images/validation.svg";
 const PAGE: &str = "docs/validation.md";
 /// Sizes, px: the plot and its margins, and the radius of a dot.
-const LEFT: f64 = 40.0;
-const PLOT: f64 = 760.0;
-const RIGHT: f64 = 24.0;
-const TOP: f64 = 26.0;
-const BOTTOM: f64 = 48.0;
-const RADIUS: f64 = 4.0;
+const LEFT: f32 = 40.0;
+const PLOT: f32 = 760.0;
+const RIGHT: f32 = 24.0;
+const TOP: f32 = 26.0;
+const BOTTOM: f32 = 48.0;
+const RADIUS: f32 = 4.0;
 /// Width of a column of dots, and height of a dot in it, px.
-const PITCH: f64 = 2.2 * RADIUS;
-const FONT_SIZE: f64 = 12.0;
+const PITCH: f32 = 2.2 * RADIUS;
+const FONT_SIZE: f32 = 12.0;
 /// Powers of ten at the ends of the axis of worst over bound. Smaller shares are drawn at the left end.
 const POWERS: [i32; 2] = [-9, 2];
 
@@ -32,16 +35,16 @@ pub fn svg(root: &Path) -> Result<String, String> {
     }
     let mut piles = BTreeMap::new();
     let places: Vec<Place> = shares.iter().map(|share| pile(*share, &mut piles)).collect();
-    let highest = piles.values().max().copied().unwrap_or(0) as f64 * PITCH;
+    let highest = piles.values().max().copied().unwrap_or(0) as f32 * PITCH;
     let base = TOP + highest + 2.0 * RADIUS;
     let mut drawn = axis(base);
     for (share, place) in shares.iter().zip(places) {
         let centre = at(place.x, base - place.y);
-        drawn += &circle(centre, RADIUS, if *share > 1.0 { "ring" } else { "dot" });
+        drawn.push(Element::Symbol(centre, Symbol::DOT.with_radius(RADIUS).filled(*share <= 1.0)));
     }
     let reached = shares.iter().filter(|share| **share <= 1.0).count();
     let said = format!("{reached} of {} results are within their bound; rings are the others", shares.len());
-    drawn += &text(at(LEFT, 16.0), Anchor::Start, "title", &said);
+    drawn.push(styled_text(at(LEFT, 16.0), Anchor::Start, Font::Title, &said));
     Ok(svg::image(LEFT + PLOT + RIGHT, base + BOTTOM, FONT_SIZE, &said, &drawn))
 }
 
@@ -65,17 +68,17 @@ fn pile(share: f64, piles: &mut BTreeMap<i32, usize>) -> Place {
     let column = if share > 1.0 { offset.floor().max(0.0) } else { (offset.ceil() - 1.0).min(-1.0) };
     let count = piles.entry(column as i32).or_insert(0);
     *count += 1;
-    at(x(1.0) + (column + 0.5) * PITCH, (*count as f64 - 0.5) * PITCH)
+    at(x(1.0) + (column + 0.5) * PITCH, (*count as f32 - 0.5) * PITCH)
 }
 
-fn x(share: f64) -> f64 {
+fn x(share: f64) -> f32 {
     let [low, high] = POWERS.map(f64::from);
     let power = share.max(f64::MIN_POSITIVE).log10().clamp(low, high);
-    LEFT + PLOT * (power - low) / (high - low)
+    LEFT + PLOT * ((power - low) / (high - low)) as f32
 }
 
-fn axis(base: f64) -> String {
-    let mut drawn = line(at(LEFT, base), at(LEFT + PLOT, base), "axis");
+fn axis(base: f32) -> Vec<Element> {
+    let mut drawn = vec![line(at(LEFT, base), at(LEFT + PLOT, base), Stroke::Axis)];
     for power in (POWERS[0]..=POWERS[1]).filter(|power| power % 2 == 0 || *power == POWERS[0]) {
         let place = x(10f64.powi(power));
         let label = match power {
@@ -84,11 +87,13 @@ fn axis(base: f64) -> String {
             power if power == POWERS[0] => format!("≤ 1e−{}", -power),
             power => format!("1e−{}", -power),
         };
-        drawn += &line(at(place, base), at(place, base + 4.0), "axis");
-        drawn += &text(at(place, base + 18.0), Anchor::Middle, "soft", &label);
+        drawn.push(line(at(place, base), at(place, base + 4.0), Stroke::Axis));
+        let faint = Font::Plain(Tone::Faint);
+        drawn.push(styled_text(at(place, base + 18.0), Anchor::Middle, faint, label));
     }
     let limit = x(1.0);
-    drawn += &line(at(limit, TOP), at(limit, base), "limit");
-    drawn += &text(at(limit + 6.0, TOP + 10.0), Anchor::Start, "", "bound");
-    drawn + &text(at(LEFT + 0.5 * PLOT, base + 38.0), Anchor::Middle, "", "worst result over its bound")
+    drawn.push(line(at(limit, TOP), at(limit, base), Stroke::Limit));
+    drawn.push(text(at(limit + 6.0, TOP + 10.0), Anchor::Start, "bound"));
+    drawn.push(text(at(LEFT + 0.5 * PLOT, base + 38.0), Anchor::Middle, "worst result over its bound"));
+    drawn
 }

@@ -1,7 +1,7 @@
 //! What all layers share: the identity of an episode ([`episode_id`]), the flag that ends long loops ([`cancel`]), a
 //! [`disk_cache`], SHA-256 ([`digest`]), atomic [`files`], files of finished work ([`journal`]), declarations of
 //! [`settings`](mod@settings), numpy files ([`npy`]), jobs on threads ([`parallel`]), ranges of numbers ([`range`]),
-//! and numbers and [`text`] in messages.
+//! [`table`]s, and numbers and [`text`] in messages.
 #![warn(missing_docs, unreachable_pub)]
 
 pub mod cancel;
@@ -14,4 +14,5 @@ pub mod npy;
 pub mod parallel;
 pub mod range;
 pub mod settings;
+pub mod table;
 pub mod text;

@@ -1,4 +1,4 @@
-//! Text in messages and tables: numbers, control characters, suggestions for misspelt names, and columns.
+//! Text in messages and tables: numbers, control characters, and suggestions for misspelt names.
 
 use std::borrow::Cow;
 
@@ -171,80 +171,6 @@ pub fn shortened(text: &str, width: usize) -> String {
     text.chars().take(width.saturating_sub(1)).chain(['…']).collect()
 }
 
-/// Alignment and width, in characters, of a column of a [`TextTable`].
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum TextColumn {
-    /// Words, [shortened] to the width.
-    Left(usize),
-    /// Numbers; a number wider than its column shifts the cells after it.
-    Right(usize),
-}
-
-/// A plain-text table: rows of cells in columns one space apart, lines of other text, and rules.
-///
-/// ```
-/// use softvt_common::text::{TextColumn, TextTable};
-///
-/// let mut table = TextTable::new([TextColumn::Left(6), TextColumn::Right(5)]);
-/// table.row(["task", "D, %"]);
-/// table.row(["cup", "1.25"]);
-/// assert_eq!(table.text, "task    D, %\ncup     1.25\n");
-/// ```
-#[derive(Clone, Debug)]
-pub struct TextTable {
-    columns: Vec<TextColumn>,
-    separator: &'static str,
-    /// The table so far; every line ends in a line break and has no trailing spaces.
-    pub text: String,
-}
-
-impl TextTable {
-    /// Width of a rule, and the largest width of a table.
-    pub const WIDTH: usize = 79;
-
-    /// An empty table.
-    pub fn new(columns: impl Into<Vec<TextColumn>>) -> Self {
-        Self { columns: columns.into(), separator: " ", text: String::new() }
-    }
-
-    /// Formats rows of equal length in columns that are as wide as their longest cell and two spaces apart. Texts of
-    /// more than 160 characters are [shortened].
-    pub fn fitted(rows: &[Vec<String>], is_right_aligned: impl Fn(usize) -> bool) -> String {
-        // The widths of format strings end at 65,535.
-        const MAX_CELL: usize = 160;
-        let rows = rows.iter().map(|row| row.iter().map(|cell| shortened(cell, MAX_CELL)).collect());
-        let rows: Vec<Vec<String>> = rows.collect();
-        let column = |at: usize| {
-            let width = rows.iter().map(|row| row[at].chars().count()).max().unwrap_or(0);
-            if is_right_aligned(at) { TextColumn::Right(width) } else { TextColumn::Left(width) }
-        };
-        let columns: Vec<TextColumn> = (0..rows.first().map_or(0, Vec::len)).map(column).collect();
-        let mut table = Self { separator: "  ", ..Self::new(columns) };
-        rows.iter().for_each(|row| table.row(row));
-        table.text
-    }
-
-    /// Appends a row.
-    pub fn row<T: AsRef<str>>(&mut self, cells: impl IntoIterator<Item = T>) {
-        let cell = |(column, cell): (&TextColumn, T)| match *column {
-            TextColumn::Left(width) => format!("{:<width$}", shortened(cell.as_ref(), width)),
-            TextColumn::Right(width) => format!("{:>width$}", cell.as_ref()),
-        };
-        self.line(self.columns.iter().zip(cells).map(cell).collect::<Vec<_>>().join(self.separator));
-    }
-
-    /// Appends a line of text.
-    pub fn line(&mut self, text: impl AsRef<str>) {
-        self.text.push_str(text.as_ref().trim_end());
-        self.text.push('\n');
-    }
-
-    /// Appends a horizontal rule.
-    pub fn rule(&mut self) {
-        self.line("─".repeat(Self::WIDTH));
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -263,15 +189,6 @@ mod tests {
     fn significant_digits_are_rounded_and_not_padded() {
         let shown = [4.0 / 3.0, 0.1 + 0.2, 2.0, 1234.5, 0.0, -0.0066667].map(|x| significant(x, 3));
         assert_eq!(shown, ["1.33", "0.3", "2", "1230", "0", "-0.00667"]);
-    }
-
-    #[test]
-    fn fitted_columns_are_as_wide_as_their_longest_cell() {
-        let rows = [["a", "number"], ["long\nname", "1"]].map(|row| row.map(str::to_owned).to_vec());
-        assert_eq!(TextTable::fitted(&rows, |column| column == 1), "a          number\nlong name       1\n");
-        let rows = [["prompt".to_owned(), "n".to_owned()], ["x".repeat(70_000), "1".to_owned()]];
-        let table = TextTable::fitted(&rows.map(Vec::from), |column| column == 1);
-        assert_eq!(table, format!("prompt{}n\n{}…  1\n", " ".repeat(156), "x".repeat(159)));
     }
 
     #[test]

@@ -6,8 +6,14 @@ use serde::Serialize;
 
 use super::{DatasetError, TaskFile, streams};
 use softvt_benchmark::CONTROL_DT;
-use softvt_common::text::{TextColumn, TextTable, decimal};
-use softvt_media::histogram::{self, Histogram};
+use softvt_common::{
+    table::{Column, Table},
+    text::decimal,
+};
+use softvt_media::{
+    axis::Axis,
+    chart::{Chart, Layout, Margins, Mark},
+};
 use softvt_policy::Action;
 
 /// Columns of an action.
@@ -92,25 +98,46 @@ fn commanded_speed(from: [f64; 7], to: [f64; 7]) -> f64 {
 }
 
 /// The statistics as a plain-text table.
-pub fn table(columns: &[ColumnStatistics]) -> String {
-    const COLUMNS: [TextColumn; 7] = {
-        use TextColumn::{Left, Right};
-        [Left(16), Right(8), Right(9), Right(9), Right(9), Right(9), Right(9)]
+pub fn table(statistics: &[ColumnStatistics]) -> String {
+    let number = |name, of: fn(&ColumnStatistics) -> f64| {
+        Column::number(name, move |s: &ColumnStatistics| decimal(Some(of(s)), 3)).width(9)
     };
-    let mut table = TextTable::new(COLUMNS);
-    table.row(["", "count", "min", "median", "mean", "sd", "max"]);
-    for s in columns {
-        let [min, median, mean, sd, max] =
-            [s.min, s.median, s.mean, s.sd, s.max].map(|x| decimal(Some(x), 3));
-        table.row([s.name.clone(), s.count.to_string(), min, median, mean, sd, max]);
-    }
-    table.text
+    let columns = [
+        Column::text("", |s: &ColumnStatistics| s.name.clone()).width(16),
+        Column::number("count", |s: &ColumnStatistics| s.count.to_string()).width(8),
+        number("min", |s| s.min),
+        number("median", |s| s.median),
+        number("mean", |s| s.mean),
+        number("sd", |s| s.sd),
+        number("max", |s| s.max),
+    ];
+    Table::new(statistics, columns).text()
 }
+
+/// Panels of the histograms.
+const PANELS: Layout = Layout {
+    columns: 4,
+    panel: [280.0, 190.0],
+    margins: Margins { left: 52.0, top: 28.0, right: 16.0, bottom: 38.0 },
+    shared: None,
+    unit: 1.0,
+};
 
 /// The histograms as an SVG image.
 pub fn svg(columns: &[ColumnStatistics]) -> String {
-    let panels = columns.iter().map(|s| Histogram { title: &s.name, min: s.min, max: s.max, bins: &s.bins });
-    histogram::svg(&panels.collect::<Vec<_>>())
+    let histogram = |s: &ColumnStatistics| {
+        // All values may be equal.
+        let (min, max) = if s.max > s.min { (s.min, s.max) } else { (s.min - 0.5, s.max + 0.5) };
+        Chart {
+            title: s.name.clone(),
+            x: Axis::linear("", min, max, 4),
+            y: Axis::counts(&s.bins, 3).with_grid(),
+            marks: vec![Mark::Bars(s.bins.clone())],
+        }
+    };
+    let names: Vec<&str> = columns.iter().map(|s| s.name.as_str()).collect();
+    let label = format!("Histograms of {}", names.join(", "));
+    PANELS.svg(&label, &columns.iter().map(histogram).collect::<Vec<_>>())
 }
 
 #[cfg(test)]
@@ -126,7 +153,9 @@ mod tests {
         let at = |x: f64, z: f64| [x, 0.0, z, 0.0, 0.0, 0.0, 0.0];
         assert!((commanded_speed(at(0.0, 0.0), at(0.03, 0.04)) - 0.05 / CONTROL_DT).abs() < 1e-12);
         assert_eq!(ColumnStatistics::new("none", Vec::new()), None);
-        let page = svg(&[s]);
-        assert!(page.starts_with("<svg") && page.matches("class=\"bar\"").count() == 4, "{page}");
+        let constant = ColumnStatistics::new("c", vec![2.0; 3]).unwrap();
+        let page = svg(&[s, constant]);
+        assert!(page.starts_with("<svg") && page.matches("class=\"bar\"").count() == 5, "{page}");
+        assert!(page.contains(">2.0<") && !page.contains("NaN"), "{page}");
     }
 }

@@ -1,11 +1,48 @@
 //! A canvas for images, lines and text: captions and charts drawn on what sensors show.
 
-use ab_glyph::{Font, FontRef, PxScale, ScaleFont, point};
+use ab_glyph::{Font as _, FontRef, PxScale, ScaleFont, point};
 use image::RgbImage;
-use tiny_skia::{Color, Paint, PathBuilder, Pixmap, Rect, Stroke, StrokeDash, Transform};
+use tiny_skia::{Color, Paint, PathBuilder, Pixmap, Rect, StrokeDash, Transform};
+
+use super::{
+    chart::FONT_SIZE,
+    drawing::{Anchor, Element, Fill, Font, Place, Stroke, Symbol, Tone},
+};
 
 /// An opaque sRGB colour.
 pub type Rgb8 = [u8; 3];
+
+/// Size of titles, units.
+const TITLE_SIZE: f32 = 12.0;
+/// Dashes of the curves of a chart in turn, units; 0 is a solid line.
+const DASHES: [f32; 4] = [0.0, 5.0, 1.5, 10.0];
+
+/// Colours of drawings on a canvas.
+#[derive(Clone, Copy, Debug)]
+pub struct CanvasColours {
+    /// Text.
+    pub ink: Rgb8,
+    /// Axes and their labels.
+    pub faint: Rgb8,
+    /// Safe.
+    pub safe: Rgb8,
+    /// Over the limit.
+    pub harm: Rgb8,
+    /// Ground of texts.
+    pub ground: Rgb8,
+}
+
+impl CanvasColours {
+    /// A colour of the palette.
+    pub fn of(&self, tone: Tone) -> Rgb8 {
+        match tone {
+            Tone::Ink => self.ink,
+            Tone::Faint => self.faint,
+            Tone::Safe => self.safe,
+            Tone::Harm => self.harm,
+        }
+    }
+}
 
 /// Pixels to draw on, with one typeface. Positions are in pixels from the top left.
 pub struct Canvas {
@@ -53,6 +90,64 @@ impl Canvas {
         self.pixels.fill_rect(rect, &paint, Transform::identity(), None);
     }
 
+    /// Draws elements with texts and lines in units of `unit` pixels.
+    pub fn draw(&mut self, elements: &[Element], unit: f32, colours: &CanvasColours) {
+        for element in elements {
+            match element {
+                Element::Line(places, stroke) => {
+                    let (colour, width, dash) = match *stroke {
+                        Stroke::Axis | Stroke::Grid => (colours.faint, 0.8, 0.0),
+                        Stroke::Limit => (colours.harm, 1.2, 0.0),
+                        Stroke::Guide => (colours.safe, 0.8, 0.0),
+                        Stroke::Event => (colours.faint, 0.8, 2.0),
+                        Stroke::Whisker => (colours.faint, 1.2, 0.0),
+                        Stroke::Gap => (colours.harm, 2.0, 0.0),
+                        Stroke::Curve { tone, dash } => (colours.of(tone), 1.6, DASHES[dash % DASHES.len()]),
+                    };
+                    let points: Vec<[f32; 2]> = places.iter().map(|Place { x, y }| [*x, *y]).collect();
+                    self.line(&points, width * unit, dash * unit, colour);
+                }
+                Element::Area(area, fill) => {
+                    let (colour, opacity) = match fill {
+                        Fill::Band => (colours.safe, 0.15),
+                        Fill::Bar => (colours.safe, 1.0),
+                        Fill::Hatched | Fill::Harm => (colours.harm, 0.12),
+                        Fill::Interval => (colours.ink, 0.07),
+                    };
+                    self.fill(area.left, area.top, area.width(), area.height(), colour, opacity);
+                }
+                Element::Symbol(Place { x, y }, Symbol { radius, tone, is_filled, .. }) => {
+                    let opacity = if *is_filled { 1.0 } else { 0.5 };
+                    self.fill(x - radius, y - radius, 2.0 * radius, 2.0 * radius, colours.of(*tone), opacity);
+                }
+                // The typeface has no letters that lie on their side.
+                Element::Text { place, shift, anchor, font, text } => {
+                    let (size, colour) = match font {
+                        Font::Title => (TITLE_SIZE * unit, colours.ink),
+                        Font::Name(tone) => (TITLE_SIZE * unit, colours.of(*tone)),
+                        Font::Plain(tone) => (FONT_SIZE * unit, colours.of(*tone)),
+                        Font::Upward => (FONT_SIZE * unit, colours.ink),
+                        Font::Strong => (FONT_SIZE * unit, colours.harm),
+                    };
+                    let x = place.x + shift;
+                    let x = match anchor {
+                        Anchor::Start => x,
+                        Anchor::Middle => x - 0.5 * self.text_width(text, size),
+                        Anchor::End => x - self.text_width(text, size),
+                    };
+                    self.write(text, x, place.y, size, colour);
+                }
+                Element::Tag { place, shift, right, text } => {
+                    let size = FONT_SIZE * unit;
+                    let width = self.text_width(text, size);
+                    let left = (place.x + shift).min(right - width);
+                    self.fill(left, place.y, width, (FONT_SIZE + 3.0) * unit, colours.ground, 0.6);
+                    self.write(text, left, place.y + size, size, colours.ink);
+                }
+            }
+        }
+    }
+
     /// Draws a line through points; `dash` is the length of its strokes and gaps, 0 for a solid line.
     pub fn line(&mut self, points: &[[f32; 2]], width: f32, dash: f32, colour: Rgb8) {
         let mut path = PathBuilder::new();
@@ -64,7 +159,7 @@ impl Canvas {
         paint.set_color(opaque(colour));
         paint.anti_alias = true;
         let dash = if dash > 0.0 { StrokeDash::new(vec![dash, dash], 0.0) } else { None };
-        let stroke = Stroke { width, dash, ..Stroke::default() };
+        let stroke = tiny_skia::Stroke { width, dash, ..Default::default() };
         self.pixels.stroke_path(&path, &paint, &stroke, Transform::identity(), None);
     }
 

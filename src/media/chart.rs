@@ -1,316 +1,475 @@
-//! A chart of several series over two axes, linear or logarithmic, as SVG. Series differ in their strokes and marks,
-//! and are named at their last points.
+//! Charts: values over two axes, as elements of a drawing, which [`svg`] and [`canvas`](super::canvas) show.
+//!
+//! Written by hand: the crate `plotters` (0.3.7 was tried) rounds places to whole pixels, writes colours as numbers, so
+//! that an image has one ground, and draws text on pixels with a typeface that has to be registered in the process. Both
+//! of its back ends would have to be replaced, and its ticks, bands and names at curves as well.
 
 use super::{
-    labels::spread,
-    palette,
-    svg::{self, Anchor, Place, at, circle, diamond, line, polyline, text, upward_text},
-    ticks::{Decades, linear_ticks, tick_label, tick_step},
+    axis::Axis,
+    drawing::{Anchor, Area, Element, Fill, Font, Place, Stroke, Symbol, Tone, at, line, styled_text, text},
+    svg,
 };
-use softvt_common::text::shortened;
 
-/// Size of the image, px.
-const WIDTH: f64 = 640.0;
-const HEIGHT: f64 = 360.0;
-/// Margins around the plotting area, px.
-const LEFT: f64 = 64.0;
-const RIGHT: f64 = 150.0;
-const TOP: f64 = 40.0;
-const BOTTOM: f64 = 46.0;
-const FONT_SIZE: f64 = 12.0;
-/// Number of intervals of an axis, at most.
-const TICKS: usize = 6;
-/// Number of labelled powers of ten, at most.
-const LOG_TICKS: usize = 8;
-/// Least distance of the names of series, px.
-const NAME_HEIGHT: f64 = 14.0;
-/// Letters of the name of a series, and of a title, that fit.
-const NAME_LETTERS: usize = 19;
-const TITLE_LETTERS: usize = 80;
-/// Largest and smallest extent of an axis whose ticks are written as decimals.
-const DECIMALS: std::ops::Range<f64> = 1e-4..1e6;
-/// Share of the extent of the points that a linear axis adds at both ends.
-const PADDING: f64 = 0.04;
+/// Size of texts at axes in units of a layout, px at a unit of 1.
+pub const FONT_SIZE: f32 = 11.0;
+/// Least distance of the names of curves, units.
+const NAME_HEIGHT: f32 = 13.0;
 
-/// Style sheet for the strokes of the second and third series; [`svg::image`] has the other classes.
-fn style() -> String {
-    let colours = svg::on_both_grounds(|of| {
-        format!(".second{{stroke:{}}}.third{{stroke:{}}}", of(&palette::INK), of(&palette::FAINT))
-    });
-    format!("<style>{colours}.second{{stroke-dasharray:7 3}}.third{{stroke-dasharray:2 3}}</style>\n")
-}
-
-/// Contents of a chart.
-#[derive(Clone, Debug, Default, PartialEq)]
+/// Values over two axes.
+#[derive(Clone, Debug, PartialEq)]
 pub struct Chart {
-    /// Title, above the plotting area.
+    /// Title above the chart.
     pub title: String,
     /// Horizontal axis.
-    pub x: ChartAxis,
+    pub x: Axis,
     /// Vertical axis.
-    pub y: ChartAxis,
-    /// The series, at most [`MAX_SERIES`].
-    pub series: Vec<Series>,
-    /// Horizontal lines.
-    pub levels: Vec<ChartLevel>,
+    pub y: Axis,
+    /// What is drawn, in this order. Values beyond the ends of an axis are drawn at them.
+    pub marks: Vec<Mark>,
 }
 
-/// Number of series that can be told apart.
-pub const MAX_SERIES: usize = 6;
-
-/// An axis.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct ChartAxis {
-    /// Title, with the unit.
-    pub label: String,
-    /// True for a logarithmic axis, whose values are positive.
-    pub is_logarithmic: bool,
-}
-
-/// Values that belong together.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Series {
-    /// Name at the last point; empty for none.
-    pub label: String,
-    /// Points x, y in the order in which a line joins them.
-    pub points: Vec<[f64; 2]>,
-    /// False for points alone.
-    pub has_line: bool,
-}
-
-/// A horizontal line.
+/// A part of a chart.
 #[derive(Clone, Debug, PartialEq)]
-pub struct ChartLevel {
-    /// Its value.
+pub enum Mark {
+    /// A range of the horizontal axis.
+    Band {
+        /// One end.
+        from: f64,
+        /// The other end.
+        to: f64,
+        /// Text in the band where it does not hold what it seems to; the band is then hatched.
+        objection: Option<&'static str>,
+    },
+    /// All values above one.
+    Above(f64),
+    /// An interval of values over a range of the horizontal axis.
+    Interval {
+        /// Ends of the range.
+        x: [f64; 2],
+        /// Smallest and largest value.
+        y: [f64; 2],
+    },
+    /// A value of the vertical axis, with a text at its left end.
+    Level {
+        /// The value.
+        y: f64,
+        /// The text.
+        label: String,
+    },
+    /// A value of the horizontal axis, with a text above the chart.
+    Guide {
+        /// The value.
+        x: f64,
+        /// The text.
+        label: String,
+    },
+    /// A value of the horizontal axis, with a text in the chart.
+    Event {
+        /// The value.
+        x: f64,
+        /// The text.
+        label: String,
+    },
+    /// Points, and a line through them.
+    Curve(Curve),
+    /// Bars of equal width from end to end of the horizontal axis.
+    Bars(Vec<usize>),
+}
+
+/// Points of a chart.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Curve {
+    /// Name at the last point; empty for none.
+    pub name: String,
+    /// The points, in the order in which a line joins them.
+    pub points: Vec<ChartPoint>,
+    /// Style of the line; none for points alone.
+    pub stroke: Option<Stroke>,
+}
+
+/// A point of a chart.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ChartPoint {
+    /// Value on the horizontal axis.
+    pub x: f64,
+    /// Value on the vertical axis.
     pub y: f64,
-    /// Text at its right end.
-    pub label: String,
+    /// Its symbol; none for a point of a line.
+    pub symbol: Option<Symbol>,
+}
+
+/// Style of the line of a chart with one curve.
+pub const SINGLE_CURVE: Stroke = Stroke::Curve { tone: Tone::Safe, dash: 0 };
+
+/// Place and size of a chart in a drawing.
+#[derive(Clone, Copy, Debug)]
+pub struct Frame {
+    /// The area between the axes, px.
+    pub area: Area,
+    /// Pixels of a unit, in which texts and their distances are measured.
+    pub unit: f32,
+}
+
+impl Frame {
+    /// Pixels of a length in units.
+    pub fn px(&self, units: f32) -> f32 {
+        units * self.unit
+    }
 }
 
 impl Chart {
-    /// The chart as SVG.
-    pub fn svg(&self) -> String {
-        let points = || self.series.iter().flat_map(|series| &series.points);
-        let levels = self.levels.iter().map(|level| level.y);
-        let scales = Scales {
-            x: Scale::around(&self.x, points().map(|[x, _]| *x)),
-            y: Scale::around(&self.y, points().map(|[_, y]| *y).chain(levels)),
-        };
-        let title = text(at(12.0, 20.0), Anchor::Start, "title", &shortened(&self.title, TITLE_LETTERS));
-        let drawn: String =
-            self.series.iter().enumerate().map(|(i, series)| draw(i, series, &scales)).collect();
-        let parts =
-            [style(), self.axes(&scales), self.level_lines(&scales), drawn, self.names(&scales), title];
-        svg::image(WIDTH, HEIGHT, FONT_SIZE, &self.title, &parts.concat())
+    /// The chart as elements of a drawing.
+    pub fn elements(&self, frame: &Frame) -> Vec<Element> {
+        let names = self.names(frame).into_iter().map(|element| element.shifted(frame.area.right));
+        self.contents(frame).into_iter().chain(names).collect()
     }
 
-    fn axes(&self, scales: &Scales) -> String {
-        let base = HEIGHT - BOTTOM;
-        let below = scales.x.ticks().into_iter().map(|(tick, label)| {
-            let x = scales.x_px(tick);
-            line(at(x, base), at(x, base + 4.0), "axis")
-                + &text(at(x, base + 17.0), Anchor::Middle, "", &label)
-        });
-        let beside = scales.y.ticks().into_iter().map(|(tick, label)| {
-            let y = scales.y_px(tick);
-            line(at(LEFT, y), at(WIDTH - RIGHT, y), "grid")
-                + &text(at(LEFT - 6.0, y + 4.0), Anchor::End, "", &label)
-        });
-        let middle = LEFT + (WIDTH - LEFT - RIGHT) / 2.0;
-        beside.chain(below).collect::<String>()
-            + &line(at(LEFT, base), at(WIDTH - RIGHT, base), "axis")
-            + &line(at(LEFT, TOP), at(LEFT, base), "axis")
-            + &text(at(middle, HEIGHT - 10.0), Anchor::Middle, "", &self.x.label)
-            + &upward_text(at(16.0, 0.5 * (TOP + base)), &self.y.label)
+    /// The elements of [`Self::elements`] without the names of the curves.
+    pub fn contents(&self, frame: &Frame) -> Vec<Element> {
+        let Area { left, top, .. } = frame.area;
+        let has_guides = self.marks.iter().any(|mark| matches!(mark, Mark::Guide { .. }));
+        let title_height = frame.px(if has_guides { 42.0 } else { 8.0 });
+        let mut drawn =
+            vec![styled_text(at(left, top - title_height), Anchor::Start, Font::Title, &self.title)];
+        let is_behind =
+            |mark: &&Mark| matches!(mark, Mark::Band { .. } | Mark::Above(_) | Mark::Interval { .. });
+        for mark in self.marks.iter().filter(is_behind) {
+            self.draw_mark(&mut drawn, frame, mark);
+        }
+        self.draw_axes(&mut drawn, frame);
+        for mark in self.marks.iter().filter(|mark| !is_behind(mark)) {
+            self.draw_mark(&mut drawn, frame, mark);
+        }
+        // Labels that are shared or missing.
+        drawn.retain(|element| !matches!(element, Element::Text { text, .. } if text.is_empty()));
+        drawn
     }
 
-    fn level_lines(&self, scales: &Scales) -> String {
-        let drawn = self.levels.iter().map(|ChartLevel { y, label }| {
-            let y = scales.y_px(*y);
-            line(at(LEFT, y), at(WIDTH - RIGHT, y), "limit")
-                + &text(at(LEFT + 6.0, y - 5.0), Anchor::Start, "over", label)
-        });
-        drawn.collect()
+    /// Height of a value, px.
+    fn y(&self, frame: &Frame, value: f64) -> f32 {
+        frame.area.bottom - self.y.share(value) as f32 * frame.area.height()
     }
 
-    /// The names of the series beside their last points, moved apart where they would overlap.
-    fn names(&self, scales: &Scales) -> String {
-        let last = |series: &Series| series.points.last().map(|[_, y]| scales.y_px(*y) + 4.0);
-        let mut names: Vec<(f64, usize)> = self
-            .series
-            .iter()
-            .enumerate()
-            .filter(|(_, series)| !series.label.is_empty())
-            .filter_map(|(index, series)| Some((last(series)?, index)))
-            .collect();
-        names.sort_by(|(a, i), (b, j)| a.total_cmp(b).then(i.cmp(j)));
-        let mut heights: Vec<&mut f64> = names.iter_mut().map(|(y, _)| y).collect();
-        spread(&mut heights, NAME_HEIGHT, [f64::NEG_INFINITY, HEIGHT - BOTTOM + 4.0]);
-        let drawn = names.into_iter().map(|(y, index)| {
-            let (mark, name) = (at(WIDTH - RIGHT + 12.0, y - 4.0), at(WIDTH - RIGHT + 22.0, y));
-            marked(index, mark)
-                + &text(name, Anchor::Start, "", &shortened(&self.series[index].label, NAME_LETTERS))
+    fn x(&self, frame: &Frame, value: f64) -> f32 {
+        frame.area.left + frame.area.width() * self.x.share(value) as f32
+    }
+
+    fn draw_axes(&self, drawn: &mut Vec<Element>, frame: &Frame) {
+        let Area { left, right, top, bottom } = frame.area;
+        for tick in self.x.ticks.iter().filter(|_| self.x.has_grid) {
+            let x = self.x(frame, tick.value);
+            drawn.push(line(at(x, top), at(x, bottom), Stroke::Grid));
+        }
+        for tick in self.y.ticks.iter().filter(|_| self.y.has_grid) {
+            let y = self.y(frame, tick.value);
+            drawn.push(line(at(left, y), at(right, y), Stroke::Grid));
+        }
+        drawn.push(Element::Line(vec![at(left, top), at(left, bottom), at(right, bottom)], Stroke::Axis));
+        for tick in &self.x.ticks {
+            let x = self.x(frame, tick.value);
+            if !self.x.has_grid {
+                drawn.push(line(at(x, bottom), at(x, bottom + frame.px(3.0)), Stroke::Axis));
+            }
+            let place = at(x, bottom + frame.px(14.0));
+            drawn.push(styled_text(place, Anchor::Middle, Font::Plain(tick.tone), &tick.label));
+        }
+        for tick in &self.y.ticks {
+            let y = self.y(frame, tick.value);
+            if !self.y.has_grid {
+                drawn.push(line(at(left - frame.px(3.0), y), at(left, y), Stroke::Axis));
+            }
+            let place = at(left, y + 0.33 * frame.px(FONT_SIZE));
+            let label = styled_text(place, Anchor::End, Font::Plain(tick.tone), &tick.label);
+            drawn.push(label.shifted(-frame.px(6.0)));
+        }
+        drawn.extend(axis_titles(frame, &self.x.label, &self.y.label));
+    }
+
+    fn draw_mark(&self, drawn: &mut Vec<Element>, frame: &Frame, mark: &Mark) {
+        let Area { left, right, top, bottom } = frame.area;
+        match mark {
+            Mark::Band { from, to, objection } => {
+                let [left, right] = [*from, *to].map(|value| self.x(frame, value));
+                let fill = if objection.is_some() { Fill::Hatched } else { Fill::Band };
+                drawn.push(Element::Area(Area { left, right, top, bottom }, fill));
+                let place = at(0.5 * (left + right), bottom - frame.px(9.0));
+                drawn.extend(objection.map(|what| styled_text(place, Anchor::Middle, Font::Strong, what)));
+            }
+            Mark::Above(value) => {
+                drawn.push(Element::Area(Area { bottom: self.y(frame, *value), ..frame.area }, Fill::Harm));
+            }
+            Mark::Interval { x: [from, to], y: [low, high] } => {
+                let [left, right] = [*from, *to].map(|value| self.x(frame, value));
+                let [top, bottom] = [*high, *low].map(|value| self.y(frame, value));
+                drawn.push(Element::Area(Area { left, right, top, bottom }, Fill::Interval));
+            }
+            Mark::Level { y, label } => {
+                let y = self.y(frame, *y);
+                drawn.push(line(at(left, y), at(right, y), Stroke::Limit));
+                let place = at(left, y - frame.px(5.0));
+                let label = styled_text(place, Anchor::Start, Font::Strong, label);
+                drawn.push(label.shifted(frame.px(6.0)));
+            }
+            Mark::Guide { x, label } => {
+                let is_left = self.x.share(*x) < 0.5;
+                let (x, y) = (self.x(frame, *x), top - frame.px(if is_left { 17.0 } else { 4.0 }));
+                drawn.push(line(at(x, y - frame.px(9.0)), at(x, bottom), Stroke::Guide));
+                let (anchor, shift) = if is_left { (Anchor::Start, 4.0) } else { (Anchor::End, -4.0) };
+                drawn.push(text(at(x, y), anchor, label).shifted(frame.px(shift)));
+            }
+            Mark::Event { x, label } => {
+                let x = self.x(frame, *x);
+                drawn.push(line(at(x, top), at(x, bottom), Stroke::Event));
+                let (place, shift) = (at(x, top), frame.px(3.0));
+                drawn.push(Element::Tag { place, shift, right, text: label.clone() });
+            }
+            Mark::Curve(Curve { points, stroke, .. }) => {
+                let places: Vec<Place> =
+                    points.iter().map(|point| at(self.x(frame, point.x), self.y(frame, point.y))).collect();
+                let symbols = points.iter().zip(&places);
+                let symbols: Vec<Element> = symbols
+                    .filter_map(|(point, place)| Some(Element::Symbol(*place, point.symbol?)))
+                    .collect();
+                if let Some(stroke) = stroke.filter(|_| places.len() > 1) {
+                    drawn.push(Element::Line(places, stroke));
+                }
+                drawn.extend(symbols);
+            }
+            Mark::Bars(counts) => {
+                let width = frame.area.width() / counts.len().max(1) as f32;
+                for (bin, count) in counts.iter().enumerate().filter(|(_, count)| **count > 0) {
+                    let left = left + width * bin as f32;
+                    let (right, top) = (left + (width - 1.0).max(0.5), self.y(frame, *count as f64));
+                    drawn.push(Element::Area(Area { left, right, top, bottom }, Fill::Bar));
+                }
+            }
+        }
+    }
+
+    /// The names of the curves beside their last points, moved apart where they would overlap; x is from the right edge
+    /// of the area.
+    pub fn names(&self, frame: &Frame) -> Vec<Element> {
+        let named = self.marks.iter().filter_map(|mark| match mark {
+            Mark::Curve(curve) if !curve.name.is_empty() => {
+                Some((self.y(frame, curve.points.last()?.y), curve))
+            }
+            _ => None,
         });
-        drawn.collect()
+        let mut named: Vec<(f32, &Curve)> = named.collect();
+        named.sort_by(|(a, _), (b, _)| a.total_cmp(b));
+        let mut heights: Vec<f32> = named.iter().map(|(y, _)| *y).collect();
+        spread(&mut heights, frame.px(NAME_HEIGHT), [f32::NEG_INFINITY, frame.area.bottom]);
+        let mut drawn = Vec::new();
+        for (y, (_, curve)) in heights.into_iter().zip(named) {
+            let symbol = curve.points.last().and_then(|point| point.symbol);
+            let (sample, left) = match (symbol, curve.stroke) {
+                (Some(symbol), _) => (Some(Element::Symbol(at(frame.px(11.0), y), symbol)), 20.0),
+                (None, Some(stroke)) => (Some(line(at(8.0, y), at(26.0, y), stroke)), 29.0),
+                (None, None) => (None, 8.0),
+            };
+            drawn.extend(sample);
+            let place = at(frame.px(left), y + 0.33 * frame.px(FONT_SIZE));
+            drawn.push(text(place, Anchor::Start, &curve.name));
+        }
+        drawn
     }
 }
 
-fn draw(index: usize, series: &Series, scales: &Scales) -> String {
-    let places: Vec<Place> =
-        series.points.iter().map(|[x, y]| at(scales.x_px(*x), scales.y_px(*y))).collect();
-    let curve = match series.has_line && places.len() > 1 {
-        true => polyline(&places, ["curve", "curve second", "curve third"][index % 3]),
-        false => String::new(),
+/// The titles of the axes of an area.
+fn axis_titles(frame: &Frame, x: &str, y: &str) -> impl Iterator<Item = Element> {
+    let Area { left, right, top, bottom } = frame.area;
+    let below = at(left + 0.5 * (right - left), bottom + frame.px(33.0));
+    let beside = at(left - frame.px(44.0), 0.5 * (top + bottom));
+    let below = (!x.is_empty()).then(|| text(below, Anchor::Middle, x));
+    below.into_iter().chain((!y.is_empty()).then(|| styled_text(beside, Anchor::Middle, Font::Upward, y)))
+}
+
+/// Moves places apart that are less than `gap` from each other, within `ends`: the least and the largest one. The
+/// places are ascending, and stay so.
+pub fn spread(places: &mut [f32], gap: f32, ends: [f32; 2]) {
+    let [mut least, mut most] = ends;
+    for place in places.iter_mut() {
+        *place = place.max(least);
+        least = *place + gap;
+    }
+    for place in places.iter_mut().rev() {
+        *place = place.min(most);
+        most = *place - gap;
+    }
+}
+
+/// Sizes of an image of charts, px.
+#[derive(Clone, Copy, Debug)]
+pub struct Layout {
+    /// Charts in a row, at most.
+    pub columns: usize,
+    /// Width and height of a chart with its margins.
+    pub panel: [f32; 2],
+    /// Margins within a panel around the area of its chart.
+    pub margins: Margins,
+    /// Margins around all panels where they share their axes: only those at the left and at the bottom have labels.
+    pub shared: Option<Margins>,
+    /// Pixels of a unit, in which texts and their distances are measured.
+    pub unit: f32,
+}
+
+/// Margins, px.
+#[derive(Clone, Copy, Debug)]
+pub struct Margins {
+    /// Left margin.
+    pub left: f32,
+    /// Upper margin.
+    pub top: f32,
+    /// Right margin.
+    pub right: f32,
+    /// Lower margin.
+    pub bottom: f32,
+}
+
+impl Layout {
+    /// One chart.
+    pub const SINGLE: Self = Self {
+        columns: 1,
+        panel: [640.0, 360.0],
+        margins: Margins { left: 64.0, top: 40.0, right: 24.0, bottom: 46.0 },
+        shared: None,
+        unit: 12.0 / FONT_SIZE,
     };
-    curve + &places.iter().map(|place| marked(index, *place)).collect::<String>()
-}
 
-/// The mark of a series.
-fn marked(index: usize, place: Place) -> String {
-    match index % MAX_SERIES {
-        0 => circle(place, 3.0, "dot"),
-        1 => diamond(place, 4.0, "mark"),
-        2 => circle(place, 3.0, "ring"),
-        3 => diamond(place, 4.0, "mark-ring"),
-        4 => circle(place, 2.0, "mark"),
-        _ => diamond(place, 3.0, "dot"),
-    }
-}
-
-/// The scales of both axes.
-struct Scales {
-    x: Scale,
-    y: Scale,
-}
-
-impl Scales {
-    fn x_px(&self, x: f64) -> f64 {
-        LEFT + self.x.share(x) * (WIDTH - LEFT - RIGHT)
-    }
-
-    fn y_px(&self, y: f64) -> f64 {
-        HEIGHT - BOTTOM - self.y.share(y) * (HEIGHT - TOP - BOTTOM)
-    }
-}
-
-/// The values along an axis.
-enum Scale {
-    Linear { low: f64, high: f64 },
-    Logarithmic(Decades),
-}
-
-impl Scale {
-    fn around(axis: &ChartAxis, values: impl Iterator<Item = f64>) -> Self {
-        if axis.is_logarithmic {
-            return Self::Logarithmic(Decades::around(values));
-        }
-        let ends = (f64::INFINITY, f64::NEG_INFINITY);
-        let (low, high) = values.fold(ends, |(low, high), x| (low.min(x), high.max(x)));
-        if low > high {
-            return Self::Linear { low: 0.0, high: 1.0 };
-        }
-        let padding = if low == high { 0.5 * low.abs().max(1.0) } else { PADDING * (high - low) };
-        // An axis of values that are not negative begins at 0 or above.
-        let low = if low >= 0.0 { (low - padding).max(0.0) } else { low - padding };
-        Self::Linear { low, high: high + padding }
-    }
-
-    /// Place of a value between the ends of the axis, 0..=1.
-    fn share(&self, value: f64) -> f64 {
-        match self {
-            Self::Linear { low, high } => (value - low) / (high - low),
-            Self::Logarithmic(decades) => decades.share(value),
-        }
-    }
-
-    /// Labelled values.
-    fn ticks(&self) -> Vec<(f64, String)> {
-        match self {
-            Self::Linear { low, high } => {
-                let step = tick_step(high - low, TICKS);
-                let is_decimal = DECIMALS.contains(&low.abs().max(high.abs()));
-                let label = |tick: f64| match is_decimal {
-                    true => tick_label(tick, step),
-                    // Rounded, since multiples of the step are not exact.
-                    false => format!("{:e}", format!("{tick:.3e}").parse::<f64>().unwrap_or(tick)),
-                };
-                linear_ticks(*low, *high, TICKS).into_iter().map(|tick| (tick, label(tick))).collect()
+    /// The charts as SVG, row by row. `label` says what the image shows.
+    pub fn svg(&self, label: &str, charts: &[Chart]) -> String {
+        let columns = charts.len().clamp(1, self.columns);
+        let rows = charts.len().div_ceil(columns).max(1);
+        let outer = self.shared.unwrap_or(Margins { left: 0.0, top: 0.0, right: 0.0, bottom: 0.0 });
+        let [width, height] = [self.panel[0] * columns as f32, self.panel[1] * rows as f32];
+        let mut drawn = Vec::new();
+        for (index, chart) in charts.iter().enumerate() {
+            let (column, row) = (index % columns, index / columns);
+            let (x, y) = (outer.left + self.panel[0] * column as f32, outer.top + self.panel[1] * row as f32);
+            let area = Area {
+                left: x + self.margins.left,
+                top: y + self.margins.top,
+                right: x + self.panel[0] - self.margins.right,
+                bottom: y + self.panel[1] - self.margins.bottom,
+            };
+            let frame = Frame { area, unit: self.unit };
+            if self.shared.is_none() {
+                drawn.extend(chart.elements(&frame));
+                continue;
             }
-            Self::Logarithmic(decades) => {
-                let ticks: Vec<f64> = decades.ticks().collect();
-                let label = |tick: f64| match DECIMALS.contains(&tick) {
-                    true => tick_label(tick, tick.min(1.0)),
-                    false => format!("{tick:e}"),
-                };
-                let every = ticks.len().div_ceil(LOG_TICKS);
-                ticks.into_iter().step_by(every).map(|tick| (tick, label(tick))).collect()
+            let mut inner = chart.clone();
+            for (axis, has_labels) in
+                [(&mut inner.x, index + columns >= charts.len()), (&mut inner.y, column == 0)]
+            {
+                axis.label.clear();
+                axis.ticks.iter_mut().filter(|_| !has_labels).for_each(|tick| tick.label.clear());
             }
+            drawn.extend(inner.elements(&frame));
         }
+        if let (Some(outer), Some(chart)) = (self.shared, charts.first()) {
+            let [left, top] = [outer.left + self.margins.left, outer.top + self.margins.top];
+            let [right, bottom] =
+                [outer.left + width - self.margins.right, outer.top + height - self.margins.bottom];
+            let frame = Frame { area: Area { left, top, right, bottom }, unit: self.unit };
+            drawn.extend(axis_titles(&frame, &chart.x.label, &chart.y.label));
+        }
+        let (width, height) = (outer.left + width + outer.right, outer.top + height + outer.bottom);
+        svg::image(width, height, self.unit * FONT_SIZE, label, &drawn)
     }
+}
+
+/// An image with a text in place of a chart, as SVG.
+pub fn text_image(what: &str) -> String {
+    let Layout { panel: [width, height], margins, unit, .. } = Layout::SINGLE;
+    let drawn = text(at(margins.left, margins.top), Anchor::Start, what);
+    svg::image(width, height, unit * FONT_SIZE, what, &[drawn])
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    fn axis(label: &str, is_logarithmic: bool) -> ChartAxis {
-        ChartAxis { label: label.to_owned(), is_logarithmic }
+    fn curve(name: &str, points: &[[f64; 2]], symbol: Symbol) -> Mark {
+        let point = |[x, y]: &[f64; 2]| ChartPoint { x: *x, y: *y, symbol: Some(symbol) };
+        let points = points.iter().map(point).collect();
+        Mark::Curve(Curve { name: name.to_owned(), points, stroke: Some(SINGLE_CURVE) })
+    }
+
+    /// A layout of panels whose charts have 100 by 100 px.
+    fn layout(columns: usize, shared: Option<Margins>) -> Layout {
+        let margins = Margins { left: 50.0, top: 50.0, right: 50.0, bottom: 50.0 };
+        Layout { columns, panel: [200.0, 200.0], margins, shared, unit: 1.0 }
     }
 
     #[test]
-    fn points_are_at_their_places_and_names_do_not_overlap() {
-        let series = |label: &str, y: f64| Series {
-            label: label.to_owned(),
-            points: vec![[0.0, y], [10.0, y + 1.0]],
-            has_line: true,
-        };
+    fn the_parts_of_a_chart_are_at_their_places() {
         let chart = Chart {
             title: "a < b".to_owned(),
-            x: axis("width, mm", false),
-            y: axis("D, %", false),
-            series: vec![series("one", 1.0), series("two", 1.001)],
-            levels: vec![ChartLevel { y: 2.0, label: "τ".to_owned() }],
+            x: Axis::linear("width", 10.0, 0.0, 5),
+            y: Axis::linear("D, %", 0.0, 2.0, 5).with_grid(),
+            marks: vec![
+                Mark::Band { from: 10.0, to: 5.0, objection: None },
+                Mark::Level { y: 1.0, label: "half".to_owned() },
+                curve("", &[[10.0, 0.0], [-7.0, 9.0]], Symbol::RING),
+                curve("", &[[5.0, 1.0]], Symbol::DIAMOND),
+                Mark::Guide { x: 5.0, label: "end".to_owned() },
+            ],
         };
-        let svg = chart.svg();
-        for part in
-            [">a &lt; b<", ">width, mm<", ">D, %<", ">τ<", "class=\"curve\"", "class=\"curve second\""]
-        {
+        let svg = layout(1, None).svg("a", std::slice::from_ref(&chart));
+        for part in [
+            "<rect x=\"50.0\" y=\"50.0\" width=\"50.0\" height=\"100.0\" class=\"band\"/>",
+            "<line x1=\"50.0\" y1=\"100.0\" x2=\"150.0\" y2=\"100.0\" class=\"limit\"/>",
+            "<line x1=\"50.0\" y1=\"150.0\" x2=\"150.0\" y2=\"50.0\" class=\"curve safe\"/>",
+            "<circle cx=\"150.0\" cy=\"50.0\" r=\"3\" class=\"ring\"/>",
+            "<polygon points=\"96.0,100.0 100.0,96.0 104.0,100.0 100.0,104.0\" class=\"mark\"/>",
+            ">end</text>",
+            ">a &lt; b</text>",
+            ">D, %</text>",
+        ] {
             assert!(svg.contains(part), "{part} in\n{svg}");
         }
-        let y_of = |name: &str| -> f64 {
-            let line = svg.lines().find(|line| line.ends_with(&format!(">{name}</text>"))).expect("a name");
-            line.split("y=\"")
-                .nth(1)
-                .and_then(|rest| rest.split('"').next())
-                .expect("y")
-                .parse()
-                .expect("a number")
-        };
-        assert!((y_of("one") - y_of("two")).abs() > NAME_HEIGHT - 0.2);
+        let hatched = Mark::Band { from: 10.0, to: 5.0, objection: Some("pressed only") };
+        let svg = layout(1, None).svg("a", &[Chart { marks: vec![hatched], ..chart }]);
+        assert!(svg.contains("class=\"hatched\"") && svg.contains(">pressed only<"), "{svg}");
+        assert!(text_image("nothing").contains(">nothing</text>\n</svg>\n"));
     }
 
     #[test]
-    fn axes_fit_any_values() {
-        let chart = |points: &[[f64; 2]], log: bool| Chart {
-            x: axis("x", log),
-            y: axis("y", log),
-            series: vec![Series { points: points.to_vec(), ..Series::default() }],
-            ..Chart::default()
+    fn names_of_curves_do_not_overlap() {
+        let named = |name: &str, y: f64| curve(name, &[[0.0, y], [10.0, y + 1.0]], Symbol::DOT);
+        let chart = Chart {
+            title: String::new(),
+            x: Axis::linear("x", 0.0, 10.0, 5),
+            y: Axis::linear("y", 0.0, 3.0, 5),
+            marks: vec![named("one", 1.0), named("two", 1.001)],
         };
-        let wide = chart(&[[1.0, 1e-9], [1e12, 1e9]], true).svg();
-        assert!(wide.contains(">1e12<") && !wide.contains(">10<"), "{wide}");
-        let large = chart(&[[0.0, 0.0], [1.0, 3e9]], false).svg();
-        assert!(large.contains(">3e9<"), "{large}");
-        let decades = chart(&[[1.0, 0.01], [1000.0, 10.0]], true).svg();
-        for tick in [">1<", ">10<", ">100<", ">1000<", ">0.01<", ">0.1<"] {
-            assert!(decades.contains(tick), "{tick} in\n{decades}");
-        }
-        assert!(
-            decades.contains("cx=\"64.0\" cy=\"314.0\"") && decades.contains("cx=\"490.0\" cy=\"40.0\""),
-            "{decades}"
-        );
-        for points in [&[][..], &[[3.0, 3.0]], &[[-1.0, -5.0], [1.0, 5.0]]] {
-            assert!(!chart(points, false).svg().contains("NaN"), "{points:?}");
-        }
+        let svg = layout(1, None).svg("", &[chart]);
+        let y_of = |name: &str| -> f32 {
+            let line = svg.lines().find(|line| line.ends_with(&format!(">{name}</text>"))).expect("a name");
+            let (_, y) = line.split_once(" y=\"").expect("a place");
+            y.split('"').next().and_then(|y| y.parse().ok()).expect("a number")
+        };
+        assert!((y_of("one") - y_of("two")).abs() > NAME_HEIGHT - 0.2);
+        let mut places = [3.0, 50.0, 50.0, 58.0];
+        spread(&mut places, 10.0, [5.0, 60.0]);
+        assert_eq!(places, [5.0, 40.0, 50.0, 60.0]);
+    }
+
+    #[test]
+    fn panels_that_share_their_axes_have_labels_at_the_left_and_at_the_bottom() {
+        let chart = Chart {
+            title: "t".to_owned(),
+            x: Axis::linear("x, mm", 0.0, 4.0, 4),
+            y: Axis::linear("y", 0.0, 30.0, 3),
+            marks: vec![Mark::Bars(vec![0, 3])],
+        };
+        let margins = Margins { left: 50.0, top: 0.0, right: 0.0, bottom: 40.0 };
+        let count = |svg: &str, what: &str| svg.matches(what).count();
+        let shared = layout(2, Some(margins)).svg("", &vec![chart.clone(); 3]);
+        assert_eq!((count(&shared, ">4</text>"), count(&shared, ">30</text>")), (2, 2), "{shared}");
+        assert_eq!(count(&shared, ">x, mm</text>") + count(&shared, ">y</text>"), 2, "{shared}");
+        let own = layout(2, None).svg("", &vec![chart; 3]);
+        assert_eq!((count(&own, ">4</text>"), count(&own, ">x, mm</text>")), (3, 3));
+        assert_eq!((count(&own, "class=\"bar\""), count(&own, "viewBox=\"0 0 400 400\"")), (3, 1));
     }
 }

@@ -6,6 +6,7 @@ use proptest::{collection::vec, prelude::*, sample::select};
 use serde_json::{Value, json};
 
 use crate::{
+    cells,
     condition_table::ConditionOutcome,
     leaderboard, page,
     run_summary::{summarize_runs, tests::stored},
@@ -259,7 +260,7 @@ proptest! {
         }
 
         // Strictness: the summary, and the figure of the report.
-        let corners = page::strictness::curve_corners(run);
+        let corners = page::kappa_curve::curve_corners(run);
         prop_assert_eq!((run.summary.kappa.is_empty(), corners.is_empty()), (!is_soft, !is_judged));
         for row in run.summary.kappa.iter().filter(|_| is_judged) {
             let expected = Some(percent(count(&|episode| episode.is_safe(row.kappa))));
@@ -277,7 +278,7 @@ proptest! {
         let shown = shown_safety.map_or_else(|| "N/A".to_owned(), |_| format!("{safe}/{n}"));
         prop_assert_eq!(cells, ["all", &format!("{goal}/{n}"), &shown]);
         let row = &tables::main_table(&runs).rows[0];
-        let cell = |count: Option<usize>| count.map_or_else(|| "N/A".to_owned(), |c| tables::rate(&Rate::new(c, n)));
+        let cell = |count: Option<usize>| count.map_or_else(|| "N/A".to_owned(), |c| cells::rate(&Rate::new(c, n)));
         prop_assert_eq!([&row[3], &row[5]], [&cell(Some(goal)), &cell(shown_safety.map(|_| safe))]);
 
         // The page: Goal and Safety, and the number of episodes of each category.

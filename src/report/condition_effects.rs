@@ -4,16 +4,16 @@
 use std::collections::BTreeMap;
 
 use super::{
-    comparison::{interval, signed},
+    cells::{interval, signed},
+    comparison::Comparison,
     run_summary::RunSummary,
-    tables::{ResultTable, strings},
 };
+use softvt_common::table::{Column, Table};
 use softvt_evaluation::statistics::{Distribution, Rate};
 use softvt_runs::{
-    paired_stats::{EpisodePair, PairedComparison, PairedDifference, pair_episodes},
+    paired_stats::{EpisodePair, PairedComparison, PairedDifference},
     record::EpisodeRecord,
     stored_run::{ConditionLabel, records_as},
-    summary::GroupScores,
 };
 
 /// The conditions of a suite and a policy.
@@ -66,39 +66,40 @@ fn effects_of_group(group: &[&RunSummary]) -> Option<ConditionEffects> {
     let mut references = group.iter().filter(|run| run.run.condition().is_none());
     let (reference, None) = (references.next()?, references.next()) else { return None };
     let reference_records = records_of_original(reference);
+    let of_condition = |run: &&RunSummary| Some((run.run.condition()?, records_of_original(run)));
+    let mut conditions: Vec<(ConditionLabel, Vec<EpisodeRecord>)> =
+        group.iter().filter_map(of_condition).collect();
+    conditions.sort_by(|(a, _), (b, _)| a.compare(b));
+    let compared = Comparison::new(&reference_records, conditions.iter().map(|(_, records)| records));
     let mut effects = Vec::new();
-    let mut changed: BTreeMap<_, Vec<EpisodeRecord>> = BTreeMap::new();
-    for run in group {
-        let Some(change) = run.run.condition() else { continue };
-        let records = records_of_original(run);
-        let pairs = pair_episodes(&reference_records, &records);
-        if pairs.is_empty() {
+    let mut changed: BTreeMap<_, Vec<&EpisodeRecord>> = BTreeMap::new();
+    for ((change, _), run) in conditions.iter().zip(&compared.others) {
+        if run.pairs.is_empty() {
             continue;
         }
-        let scores = GroupScores::from_records(&pairs.iter().map(|pair| pair.second).collect::<Vec<_>>());
+        let scores = run.scores();
         effects.push(ConditionEffect {
-            change,
+            change: change.clone(),
             goal: scores.goal_success_rate,
             safety: scores.soft_safety_rate(),
-            d_over_tau: pairs.iter().filter_map(|pair| pair.second.d_over_tau()).collect(),
-            differences: PairedComparison::from_pairs(&pairs),
+            d_over_tau: run.pairs.iter().filter_map(|pair| pair.second.d_over_tau()).collect(),
+            differences: run.differences.clone(),
         });
-        for EpisodePair { first, second } in pairs {
-            changed.entry(first.header.id.index()).or_default().push(second.clone());
+        for EpisodePair { first, second } in &run.pairs {
+            changed.entry(first.header.id.index()).or_default().push(second);
         }
     }
     if effects.is_empty() {
         return None;
     }
-    effects.sort_by(|a, b| a.change.compare(&b.change));
     let mean = |test: fn(&EpisodeRecord) -> bool| {
         let percent = |record: &EpisodeRecord| {
             if record.outcome.is_valid() && test(record) { 100.0 } else { 0.0 }
         };
         // One value per episode: its mean over the conditions. Episodes are independent, their conditions are not.
-        let pairs = reference_records.iter().filter_map(|record| {
+        let pairs = compared.reference.iter().filter_map(|record| {
             let others = changed.get(&record.header.id.index())?;
-            let mean = others.iter().map(percent).sum::<f64>() / others.len() as f64;
+            let mean = others.iter().map(|record| percent(record)).sum::<f64>() / others.len() as f64;
             Some([percent(record), mean])
         });
         PairedDifference::from_values(pairs)
@@ -129,37 +130,48 @@ fn signed_with_interval(difference: &PairedDifference, digits: usize) -> String 
     }
 }
 
+/// A row of the table of effects.
+struct EffectRow<'a> {
+    suite: &'a ConditionEffects,
+    condition: String,
+    episodes: usize,
+    goal: PairedDifference,
+    safety: PairedDifference,
+    d_over_tau: PairedDifference,
+}
+
 /// The table of all effects; `None` without any.
-pub fn effects_table(effects: &[ConditionEffects]) -> Option<ResultTable> {
+pub fn effects_table(effects: &[ConditionEffects]) -> Option<Table> {
     let mut rows = Vec::new();
     for suite in effects {
-        let name = format!("{}, {}", suite.suite, suite.method);
-        for effect in &suite.effects {
-            let PairedComparison { pairs, goal, safety, d_over_tau, .. } = &effect.differences;
-            rows.push(vec![
-                name.clone(),
-                effect.change.label.clone(),
-                pairs.to_string(),
-                signed_with_interval(goal, 1),
-                signed_with_interval(safety, 1),
-                signed_with_interval(d_over_tau, 2),
-            ]);
-        }
+        rows.extend(suite.effects.iter().map(|effect| {
+            let PairedComparison { pairs: episodes, goal, safety, d_over_tau, .. } = effect.differences;
+            EffectRow { suite, condition: effect.change.label.clone(), episodes, goal, safety, d_over_tau }
+        }));
         if suite.effects.len() > 1 {
-            rows.push(vec![
-                name,
-                format!("mean of {} conditions", suite.effects.len()),
-                suite.mean_goal.n.to_string(),
-                signed_with_interval(&suite.mean_goal, 1),
-                signed_with_interval(&suite.mean_safety, 1),
-                "–".to_owned(),
-            ]);
+            rows.push(EffectRow {
+                suite,
+                condition: format!("mean of {} conditions", suite.effects.len()),
+                episodes: suite.mean_goal.n,
+                goal: suite.mean_goal,
+                safety: suite.mean_safety,
+                d_over_tau: PairedDifference::default(),
+            });
         }
     }
-    (!rows.is_empty()).then(|| ResultTable {
-        caption: "Change from the reference on the same episodes, percentage points, with 95 % intervals: of single conditions by Agresti and Min, of means by the bootstrap over episodes.".to_owned(),
-        head: strings(["Suite", "Condition", "Episodes", "Δ Goal", "Δ Safety", "Δ D/τ"]),
-        rows,
+    let change = |heading, digits, of: fn(&EffectRow) -> PairedDifference| {
+        Column::number(heading, move |row: &EffectRow| signed_with_interval(&of(row), digits))
+    };
+    let columns = [
+        Column::text("Suite", |row: &EffectRow| format!("{}, {}", row.suite.suite, row.suite.method)),
+        Column::text("Condition", |row: &EffectRow| row.condition.clone()),
+        Column::number("Episodes", |row: &EffectRow| row.episodes.to_string()),
+        change("Δ Goal", 1, |row| row.goal),
+        change("Δ Safety", 1, |row| row.safety),
+        change("Δ D/τ", 2, |row| row.d_over_tau),
+    ];
+    (!rows.is_empty()).then(|| {
+        Table::new(&rows, columns).with_caption("Change from the reference on the same episodes, percentage points, with 95 % intervals: of single conditions by Agresti and Min, of means by the bootstrap over episodes.")
     })
 }
 

@@ -3,14 +3,19 @@
 use serde::Serialize;
 
 use super::{
-    comparison::{self, signed},
+    cells::signed,
+    comparison::ComparedRun,
+    comparison_table::{LEGEND, condition_differences},
     styled_text::{Emphasis, StyledText, TerminalFormat},
 };
 use softvt_benchmark::ShiftValue;
-use softvt_common::text::{TextColumn, TextTable, counted, decimal, escape_control, shortened};
+use softvt_common::{
+    table::{Column, Table},
+    text::{counted, decimal, escape_control, shortened},
+};
 use softvt_evaluation::statistics::{Distribution, Rate};
 use softvt_runs::{
-    paired_stats::{PairedComparison, PairedDifference, pair_episodes},
+    paired_stats::{PairedComparison, PairedDifference},
     record::EpisodeRecord,
     stored_run::records_as,
     summary::GroupScores,
@@ -42,7 +47,7 @@ impl ConditionOutcome {
     pub fn new(folder: String, records: &[EpisodeRecord], reference: Option<&[EpisodeRecord]>) -> Self {
         let paired = reference.map(|reference| {
             let name = reference.first().map_or("", |record| &record.header.id.suite);
-            PairedComparison::from_pairs(&pair_episodes(reference, &records_as(records, name)))
+            ComparedRun::new(reference, &records_as(records, name)).differences
         });
         let scores = GroupScores::from_records(&records.iter().collect::<Vec<_>>());
         Self {
@@ -81,6 +86,12 @@ pub struct ConditionRow {
     pub not_applicable: Option<String>,
 }
 
+impl ConditionRow {
+    fn paired(&self) -> Option<&PairedComparison> {
+        self.outcome.as_ref()?.paired.as_ref()
+    }
+}
+
 /// A suite under all conditions, the reference first.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ConditionTable {
@@ -103,17 +114,28 @@ pub fn table(suite: &ConditionTable, format: TerminalFormat) -> String {
     let title =
         format!("{} · {} · {conditions} · {} each", suite.suite, suite.policy, counted(episodes, "episode"));
     text.line(Emphasis::Bold, shortened(&title, format.width - 1));
-    let mut table = TextTable::new([
-        TextColumn::Left(format.width.saturating_sub(1 + 51).clamp(16, 40)),
-        TextColumn::Right(7),
-        TextColumn::Right(9),
-        TextColumn::Right(9),
-        TextColumn::Right(10),
-        TextColumn::Right(11),
-    ]);
-    table.row(["condition", "Goal, %", "Safety, %", "Δ Safety", "D/limit", "Δ D/limit"]);
-    suite.rows.iter().for_each(|row| table.row(cells(row, suite.deformable)));
-    text.plain(&table.text);
+    let width = format.width.saturating_sub(1 + 51).clamp(16, 40);
+    let number = |heading, width, cell: fn(&ConditionRow, &ConditionTable) -> String| {
+        Column::number(heading, move |row: &ConditionRow| cell(row, suite)).width(width)
+    };
+    let columns = [
+        Column::text("condition", |row: &ConditionRow| row.condition.clone()).width(width),
+        number("Goal, %", 7, |row, _| outcome_cell(row, true, |of| decimal(of.goal_success_rate.rate, 1))),
+        number("Safety, %", 9, |row, suite| {
+            outcome_cell(row, suite.deformable, |of| match of.safety_success_rate.rate {
+                Some(rate) => decimal(Some(rate), 1),
+                None => "N/A".to_owned(),
+            })
+        }),
+        number("Δ Safety", 9, |row, suite| {
+            change(row.paired().filter(|_| suite.deformable), 1, |of| of.safety)
+        }),
+        number("D/limit", 10, |row, suite| {
+            outcome_cell(row, suite.deformable, |of| decimal(of.d_over_tau.mean, 2))
+        }),
+        number("Δ D/limit", 11, |row, _| change(row.paired(), 2, |of| of.d_over_tau)),
+    ];
+    text.plain(&Table::new(&suite.rows, columns).text());
     let mut note = |sentence: &str| text.wrapped(sentence, format.width - 1);
     for row in &suite.rows {
         if let Some(why) = &row.not_applicable {
@@ -136,19 +158,13 @@ pub fn table(suite: &ConditionTable, format: TerminalFormat) -> String {
 /// All paired differences, one block per condition.
 fn push_details(text: &mut StyledText, suite: &ConditionTable, format: TerminalFormat) {
     for row in &suite.rows {
-        let Some(paired) = row.outcome.as_ref().and_then(|outcome| outcome.paired.as_ref()) else { continue };
+        let Some(paired) = row.paired() else { continue };
         text.end();
         text.line(Emphasis::Bold, shortened(&row.condition, format.width - 1));
-        let mut changes = TextTable::new(comparison::COLUMNS);
-        comparison::push_headings(&mut changes, "", "ref.", "cond.");
-        comparison::push_rates(&mut changes, paired);
-        if suite.deformable {
-            comparison::push_difference(&mut changes, "D/limit", &paired.d_over_tau, 2);
-        }
-        text.plain(&changes.text);
+        text.plain(&condition_differences(paired, suite.deformable));
     }
     text.end();
-    text.wrapped(comparison::LEGEND, format.width - 1);
+    text.wrapped(LEGEND, format.width - 1);
 }
 
 /// Columns of the name of a policy in [`controllers_table`].
@@ -173,43 +189,55 @@ pub fn controllers_table(tables: &[ConditionTable], format: TerminalFormat) -> S
 }
 
 fn controllers_of_suites(suites: &[ConditionTable]) -> String {
-    let mut columns = vec![TextColumn::Left(POLICY_WIDTH)];
-    columns.resize(1 + suites.len(), TextColumn::Right(SUITE_WIDTH));
-    let mut table = TextTable::new(columns);
-    let episodes = suites.iter().flat_map(|suite| &suite.rows).filter_map(|row| row.outcome.as_ref());
-    let episodes = counted(episodes.map(|outcome| outcome.episodes).max().unwrap_or(0), "episode");
-    table.line(format!("Goal / Safety Success, % · {episodes} each"));
-    table.rule();
-    let names = suites.iter().map(|suite| shortened(&suite.suite, SUITE_WIDTH));
-    table.row(std::iter::once("controller".to_owned()).chain(names));
-    table.rule();
-    let rows = suites.first().map_or(0, |suite| suite.rows.len());
-    for index in 0..rows {
-        let name = |row: &ConditionRow, policy: &str| match (index, row.blind) {
-            (0, _) => policy.to_owned(),
-            (_, true) => format!("{} *", row.condition),
-            (_, false) => row.condition.clone(),
-        };
-        let first = name(&suites[0].rows[index], &suites[0].policy);
-        let cells = suites.iter().map(|suite| {
-            suite.rows[index].outcome.as_ref().map_or_else(
-                || "N/A".to_owned(),
-                |outcome| {
-                    let [goal, safety] = [outcome.goal_success_rate, outcome.safety_success_rate];
-                    format!("{} / {:>5}", decimal(goal.rate, 1), decimal(safety.rate, 1))
-                },
-            )
-        });
-        table.row(std::iter::once(first).chain(cells));
-    }
-    table.rule();
+    let outcomes = suites.iter().flat_map(|suite| &suite.rows).filter_map(|row| row.outcome.as_ref());
+    let episodes = counted(outcomes.map(|outcome| outcome.episodes).max().unwrap_or(0), "episode");
+    // The reference has the name of its policy.
+    let name = |index: &usize| match (index, &suites[0].rows[*index]) {
+        (0, _) => suites[0].policy.clone(),
+        (_, ConditionRow { condition, blind: true, .. }) => format!("{condition} *"),
+        (_, ConditionRow { condition, .. }) => condition.clone(),
+    };
+    let rates = |suite: &'_ ConditionTable| {
+        let cells: Vec<String> = suite.rows.iter().map(|row| outcome_cell(row, true, both_rates)).collect();
+        Column::number(shortened(&suite.suite, SUITE_WIDTH), move |index: &usize| cells[*index].clone())
+            .width(SUITE_WIDTH)
+    };
+    let rows: Vec<usize> = (0..suites.first().map_or(0, |suite| suite.rows.len())).collect();
+    let columns = std::iter::once(Column::text("controller", name).width(POLICY_WIDTH));
+    let mut lines = Table::new(&rows, columns.chain(suites.iter().map(rates))).lines();
+    let rule = "─".repeat(TerminalFormat::DEFAULT_WIDTH - 1);
+    lines.insert(1, rule.clone());
+    lines.insert(0, rule.clone());
+    lines.insert(0, format!("Goal / Safety Success, % · {episodes} each"));
+    lines.push(rule);
     if suites.iter().flat_map(|suite| &suite.rows).any(|row| row.blind) {
-        table.line("* one constant number, by what shows of an object and the statistics of suites");
-        for suite in suites {
-            table.line(format!("best of *, {}: {}", suite.suite, best_blind(suite)));
-        }
+        let blind = "* one constant number, by what shows of an object and the statistics of suites";
+        lines.push(blind.to_owned());
+        let best = |suite: &ConditionTable| format!("best of *, {}: {}", suite.suite, best_blind(suite));
+        lines.extend(suites.iter().map(best));
     }
-    table.text
+    lines.join("\n") + "\n"
+}
+
+fn both_rates(outcome: &ConditionOutcome) -> String {
+    let [goal, safety] = [outcome.goal_success_rate, outcome.safety_success_rate];
+    format!("{} / {:>5}", decimal(goal.rate, 1), decimal(safety.rate, 1))
+}
+
+/// A cell about an outcome; N/A if it does not apply or the condition was not run.
+fn outcome_cell(row: &ConditionRow, applies: bool, cell: impl Fn(&ConditionOutcome) -> String) -> String {
+    row.outcome.as_ref().filter(|_| applies).map_or_else(|| "N/A".to_owned(), cell)
+}
+
+/// A difference from the reference, with a mark if it is significant; empty for the reference itself.
+fn change(
+    paired: Option<&PairedComparison>,
+    digits: usize,
+    of: fn(&PairedComparison) -> PairedDifference,
+) -> String {
+    let Some(difference) = paired.map(of).filter(|difference| difference.n > 0) else { return String::new() };
+    let mark = if difference.p.is_some_and(|p| p < 0.05) { " *" } else { "" };
+    format!("{}{mark}", signed(difference.difference, digits))
 }
 
 /// The policy with a constant number that is safe most often, with the interval of its Safety Success.
@@ -224,124 +252,4 @@ fn best_blind(suite: &ConditionTable) -> String {
     let Rate { rate, wilson95, .. } = outcome.safety_success_rate;
     let interval = wilson95.map_or(String::new(), |[low, high]| format!(" [{low:.1}, {high:.1}]"));
     format!("{}, Safety {} %{interval}", row.condition, decimal(rate, 1))
-}
-
-fn cells(row: &ConditionRow, deformable: bool) -> [String; 6] {
-    let Some(outcome) = &row.outcome else {
-        return [&row.condition, "N/A", "N/A", "", "N/A", ""].map(str::to_owned);
-    };
-    let paired = outcome.paired.as_ref();
-    let change = |difference: Option<PairedDifference>, digits: usize| {
-        let Some(difference) = difference.filter(|difference| difference.n > 0) else { return String::new() };
-        let mark = if difference.p.is_some_and(|p| p < 0.05) { " *" } else { "" };
-        format!("{}{mark}", signed(difference.difference, digits))
-    };
-    let not_applicable = || "N/A".to_owned();
-    let safety = outcome.safety_success_rate.rate.filter(|_| deformable);
-    [
-        row.condition.clone(),
-        decimal(outcome.goal_success_rate.rate, 1),
-        safety.map_or_else(not_applicable, |rate| decimal(Some(rate), 1)),
-        change(paired.filter(|_| deformable).map(|paired| paired.safety), 1),
-        if deformable { decimal(outcome.d_over_tau.mean, 2) } else { not_applicable() },
-        change(paired.map(|paired| paired.d_over_tau), 2),
-    ]
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::sample_record;
-
-    fn row(condition: &str, outcome: Option<ConditionOutcome>) -> ConditionRow {
-        let not_applicable = outcome.is_none().then(|| "nothing in it deforms".to_owned());
-        ConditionRow {
-            rigid_twin: false,
-            condition: condition.into(),
-            shift: Vec::new(),
-            set: Vec::new(),
-            policy: None,
-            blind: false,
-            outcome,
-            not_applicable,
-        }
-    }
-
-    #[test]
-    fn the_table_has_one_row_per_condition_and_at_most_100_columns() {
-        let reference = [sample_record()];
-        let mut worse = sample_record();
-        (worse.verdict.safety, worse.verdict.object_mut().d_peak) = (false, Some(1.5));
-        let suite = ConditionTable {
-            suite: "buns".into(),
-            policy: "expert".into(),
-            deformable: true,
-            rows: vec![
-                row("reference", Some(ConditionOutcome::new("reference".into(), &reference, None))),
-                row("heavy", Some(ConditionOutcome::new("heavy".into(), &[worse], Some(&reference)))),
-                row("a condition with a name that is very long", None),
-            ],
-        };
-        let text = table(&suite, TerminalFormat::PLAIN);
-        assert!(text.lines().all(|line| line.chars().count() < 80), "{text}");
-        let words = |text: &str, start: &str| -> Vec<String> {
-            let line = text.lines().find(|line| line.starts_with(start)).expect("a row");
-            line.split_whitespace().map(str::to_owned).collect()
-        };
-        assert_eq!(words(&text, "reference"), ["reference", "100.0", "100.0", "0.33"]);
-        assert_eq!(words(&text, "heavy"), ["heavy", "100.0", "0.0", "−100.0", "1.50", "+1.17"]);
-        assert!(
-            text.contains("a condition with a name tha…") && text.contains(": N/A, nothing in it deforms"),
-            "{text}"
-        );
-        assert!(!text.contains("better"), "{text}");
-        assert!(!compares_policies(std::slice::from_ref(&suite)));
-        let details = table(&suite, TerminalFormat::PLAIN.with_details());
-        assert!(details.lines().all(|line| line.chars().count() < 80), "{details}");
-        assert_eq!(
-            words(&details, "Safety, %"),
-            ["Safety,", "%", "100.0", "0.0", "−100.0", "0", "1", "–", "1"]
-        );
-        assert_eq!(words(&details, "D/limit  ")[1..4], ["0.33", "1.50", "+1.17"]);
-    }
-
-    #[test]
-    fn policies_are_one_row_each_and_the_best_without_touch_is_named() {
-        let outcome = |safe: &[bool]| {
-            let records = safe.iter().map(|safe| {
-                let mut record = sample_record();
-                record.verdict.safety = *safe;
-                record
-            });
-            ConditionOutcome::new("x".into(), &records.collect::<Vec<_>>(), None)
-        };
-        let suite = |name: &str| {
-            let policy = |condition: &str, blind, safe: &[bool]| ConditionRow {
-                policy: Some(condition.into()),
-                blind,
-                ..row(condition, Some(outcome(safe)))
-            };
-            ConditionTable {
-                suite: name.into(),
-                policy: "expert".into(),
-                deformable: true,
-                rows: vec![
-                    row("reference", Some(outcome(&[true, true]))),
-                    policy("servo", false, &[true, true]),
-                    policy("loose", true, &[false, false]),
-                    policy("middle", true, &[true, false]),
-                ],
-            }
-        };
-        let suites = ["buns", "rolls", "cubes", "a suite with a long name", "loaves"].map(suite);
-        assert!(compares_policies(&suites));
-        let text = controllers_table(&suites, TerminalFormat::PLAIN);
-        assert!(text.lines().all(|line| line.chars().count() < 80), "{text}");
-        let lines = |start: &str| text.lines().filter(|line| line.starts_with(start)).collect::<Vec<_>>();
-        assert_eq!(lines("expert").len(), 2, "five suites take two tables: {text}");
-        let words: Vec<&str> = lines("middle *")[1].split_whitespace().collect();
-        assert_eq!(words, ["middle", "*", "100.0", "/", "50.0", "100.0", "/", "50.0"]);
-        assert_eq!(lines("best of *, rolls"), ["best of *, rolls: middle, Safety 50.0 % [9.5, 90.5]"]);
-        assert!(lines("reference").is_empty(), "{text}");
-    }
 }

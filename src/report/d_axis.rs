@@ -1,13 +1,27 @@
 //! The logarithmic axis of D/τ, the same for all figures and for videos of several policies.
 
-/// Ends of the axis.
-const D_OVER_TAU: [f64; 2] = [0.05, 50.0];
+use softvt_media::{
+    axis::{Axis, Scale, Tick},
+    drawing::Tone,
+};
+
+/// Place of D/τ on the axis.
+const SCALE: Scale = Scale::Logarithmic { from: 0.05, to: 50.0 };
 /// Labelled values of the axis.
 pub(crate) const D_TICKS: [f64; 6] = [0.1, 0.3, 1.0, 3.0, 10.0, 30.0];
 
 /// Place of D/τ on the axis, 0 to 1 within its ends.
 pub(crate) fn d_share(d_over_tau: f64) -> f64 {
-    (d_over_tau.max(f64::MIN_POSITIVE) / D_OVER_TAU[0]).ln() / (D_OVER_TAU[1] / D_OVER_TAU[0]).ln()
+    SCALE.share(d_over_tau)
+}
+
+/// The axis as that of a chart in a video.
+pub(crate) fn d_axis() -> Axis {
+    let tick = |value: f64| match value {
+        1.0 => Tick { value, label: "τ".to_owned(), tone: Tone::Harm },
+        _ => Tick { value, label: value.to_string(), tone: Tone::Faint },
+    };
+    Axis { label: String::new(), scale: SCALE, ticks: D_TICKS.map(tick).to_vec(), has_grid: false }
 }
 
 #[cfg(test)]

@@ -1,110 +1,55 @@
 //! One JSON row per run, for leaderboards.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 
-use serde::Serialize;
-use serde_json::json;
+use serde_json::{Value, json};
 
 use super::run_summary::RunSummary;
-use softvt_benchmark::{NeededKnowledge, ShiftValue};
-use softvt_common::{digest::sha256_hex, episode_id::EpisodeSplit};
-use softvt_evaluation::statistics::Rate;
+use softvt_common::digest::sha256_hex;
 use softvt_runs::{
     manifest::{RunManifest, in_project},
     summary::SuiteSummary,
 };
 
-/// The results of one run, and all that they depend on.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-struct LeaderboardRow<'a> {
-    benchmark: &'static str,
-    /// Version of softvt that made the run.
-    version: &'a str,
-    suite: &'a str,
-    /// What a safe grip needs besides the kind of the object.
-    needs: Option<NeededKnowledge>,
-    policy: &'a str,
-    /// Policy, its privileged inputs and changes of the suite.
-    method: &'a str,
-    /// True if the policy had the true state.
-    privileged: bool,
-    /// True if it repeated the actions of a recorded run.
-    replayed: bool,
-    /// True if it had the true forces on the pads.
-    force_observed: bool,
-    /// Base seed; null in a judged run, whose `seed_hash` is given.
-    seed: u64,
-    seed_hash: Option<&'a str>,
-    split: EpisodeSplit,
-    shifts: &'a [ShiftValue],
-    settings_changed: &'a [(String, String)],
-    /// SHA-256 of the names and hashes of all files but that of the policy.
-    sources_sha256: String,
-    /// Those of softvt that the run has in another version.
-    modified: Option<&'a BTreeSet<String>>,
-    /// Number of episodes of more than one attempt.
-    repeated_episodes: usize,
-    /// Number of episodes whose goal was reached without contact of the robot with a target.
-    goals_untouched: usize,
-    /// True if the run is not finished.
-    partial: bool,
-    tasks: usize,
-    episodes: usize,
-    invalid: usize,
-    /// Rates in %, with 95 % Wilson intervals.
-    goal: Rate,
-    no_drop: Rate,
-    safety: Rate,
-    dsr: Option<Rate>,
-    contact_safety: Rate,
-    /// Definition of D.
-    metric_id: &'a str,
-    /// Median of the peak of D, %.
-    d_peak_median: Option<f64>,
-    /// Median of the largest force on a pad over the least that holds the object.
-    grip_ratio_median: Option<f64>,
+/// The results of one run, and all that they depend on: docs/results.md lists the fields.
+fn row(RunSummary { run, summary, method }: &RunSummary) -> Value {
+    let SuiteSummary { scores, .. } = summary;
+    let manifest = &run.manifest;
+    json!({
+        "benchmark": "softvt",
+        "version": manifest.softvt,
+        "suite": summary.suite,
+        "needs": manifest.needs,
+        "policy": summary.policy,
+        "method": method,
+        "privileged": summary.privileged,
+        "replayed": summary.replayed,
+        "force_observed": summary.force_observed,
+        "seed": manifest.seed,
+        "seed_hash": manifest.seed_hash,
+        "split": manifest.split,
+        "shifts": manifest.shifts,
+        "settings_changed": manifest.set,
+        "sources_sha256": sources_sha256(manifest),
+        "modified": Some(&manifest.modified).filter(|files| !files.is_empty()),
+        "repeated_episodes": summary.repeated_episodes.len(),
+        "goals_untouched": summary.goals_untouched.len(),
+        "partial": run.is_partial(),
+        "tasks": summary.by_task.len(),
+        "episodes": scores.episodes,
+        "invalid": scores.invalid,
+        "goal": scores.goal_success_rate,
+        "no_drop": scores.no_drop_rate,
+        "safety": scores.safety_success_rate,
+        "dsr": scores.dsr,
+        "contact_safety": scores.contact_safety_rate,
+        "metric_id": manifest.metric_id,
+        "d_peak_median": scores.deformation.median,
+        "grip_ratio_median": scores.grip_ratio.median,
+    })
 }
 
-impl<'a> LeaderboardRow<'a> {
-    fn new(run: &'a RunSummary) -> Self {
-        let RunSummary { run, summary, method } = run;
-        let SuiteSummary { scores, .. } = summary;
-        let manifest = &run.manifest;
-        Self {
-            benchmark: "softvt",
-            version: &manifest.softvt,
-            suite: &summary.suite,
-            needs: manifest.needs,
-            policy: &summary.policy,
-            method,
-            privileged: summary.privileged,
-            replayed: summary.replayed,
-            force_observed: summary.force_observed,
-            seed: manifest.seed,
-            seed_hash: manifest.seed_hash.as_deref(),
-            split: manifest.split,
-            shifts: &manifest.shifts,
-            settings_changed: &manifest.set,
-            sources_sha256: sources_sha256(manifest),
-            modified: Some(&manifest.modified).filter(|files| !files.is_empty()),
-            repeated_episodes: summary.repeated_episodes.len(),
-            goals_untouched: summary.goals_untouched.len(),
-            partial: run.is_partial(),
-            tasks: summary.by_task.len(),
-            episodes: scores.episodes,
-            invalid: scores.invalid,
-            goal: scores.goal_success_rate,
-            no_drop: scores.no_drop_rate,
-            safety: scores.safety_success_rate,
-            dsr: scores.dsr,
-            contact_safety: scores.contact_safety_rate,
-            metric_id: &manifest.metric_id,
-            d_peak_median: scores.deformation.median,
-            grip_ratio_median: scores.grip_ratio.median,
-        }
-    }
-}
-
+/// SHA-256 of the names and hashes of all files but that of the policy.
 fn sources_sha256(RunManifest { sources, policy_file, .. }: &RunManifest) -> String {
     let sources = sources.iter().filter(|(name, _)| Some(*name) != policy_file.as_ref());
     let sources: BTreeMap<&str, &String> = sources.map(|(name, hash)| (in_project(name), hash)).collect();
@@ -113,8 +58,7 @@ fn sources_sha256(RunManifest { sources, policy_file, .. }: &RunManifest) -> Str
 
 /// The rows of runs as JSON lines, in their order.
 pub fn rows(runs: &[RunSummary]) -> String {
-    let row = |run| json!(LeaderboardRow::new(run)).to_string() + "\n";
-    runs.iter().map(row).collect()
+    runs.iter().map(|run| row(run).to_string() + "\n").collect()
 }
 
 #[cfg(test)]

@@ -5,8 +5,10 @@
 
 #[cfg(test)]
 mod agreement;
+mod cells;
 pub mod commands;
 pub mod comparison;
+pub mod comparison_table;
 pub mod condition_effects;
 pub mod condition_table;
 mod d_axis;
@@ -18,6 +20,8 @@ pub mod policy_ranking;
 pub mod report_files;
 pub mod run_summary;
 pub mod styled_text;
+#[cfg(test)]
+mod table_snapshots;
 pub mod tables;
 mod task_names;
 pub mod terminal;

@@ -4,11 +4,19 @@ use std::{cmp::Reverse, collections::BTreeSet};
 
 use serde::Serialize;
 
-use super::comparison::{CompareError, check_unique, differing_fields, names, no_common_episode, records};
-use softvt_common::text::{TextColumn, TextTable, counted, decimal, shortened};
+use super::{
+    comparison::{
+        CompareError, Comparison, check_unique, differing_fields, names, no_common_episode, records,
+    },
+    styled_text::TerminalFormat,
+};
+use softvt_common::{
+    table::{Column, Table},
+    text::{counted, decimal},
+};
 use softvt_evaluation::{category::EpisodeCategory, statistics::Rate};
 use softvt_runs::{
-    paired_stats::{EpisodePair, PairedComparison, pair_episodes},
+    paired_stats::{PairedComparison, PairedDifference, pair_episodes},
     paired_tests::{holm, letters},
     record::EpisodeRecord,
     stored_run::StoredRun,
@@ -68,32 +76,31 @@ impl PolicyRanking {
         }
         let differing: BTreeSet<String> =
             rest.iter().flat_map(|other| differing_fields(first, other)).collect();
-        let in_common = |runs: &'_ [StoredRun]| {
+        let mut ranked: Vec<(String, GroupScores, Vec<&EpisodeRecord>)> = Vec::new();
+        for (name, runs) in names(folders).into_iter().zip(folders) {
+            let name = method_label(&name, runs.first().map(StoredRun::marks).unwrap_or_default());
             let pairs = pair_episodes(common.iter().copied(), records(runs));
-            pairs.into_iter().map(|pair| pair.second.clone()).collect()
+            let records: Vec<&EpisodeRecord> = pairs.into_iter().map(|pair| pair.second).collect();
+            ranked.push((name, GroupScores::from_records(&records), records));
+        }
+        ranked.sort_by_key(|(_, scores, _)| Reverse(scores.count(EpisodeCategory::Safe)));
+        let records: Vec<Vec<&EpisodeRecord>> = ranked.iter().map(|(.., records)| records.clone()).collect();
+        let compared = Comparison::of_all_pairs(&records);
+        let letters_of = |of: fn(&PairedComparison) -> &PairedDifference| {
+            letters_of(records.len(), |a, b| of(&compared[a].others[b - a - 1].differences).p)
         };
-        let marked = |(name, runs): (String, &Vec<StoredRun>)| {
-            let marks = runs.first().map(StoredRun::marks).unwrap_or_default();
-            (method_label(&name, marks), in_common(runs))
-        };
-        let mut runs: Vec<(String, Vec<EpisodeRecord>)> =
-            names(folders).into_iter().zip(folders).map(marked).collect();
-        let scores =
-            |records: &[EpisodeRecord]| GroupScores::from_records(&records.iter().collect::<Vec<_>>());
-        runs.sort_by_key(|(_, records)| Reverse(scores(records).count(EpisodeCategory::Safe)));
-        let compared = |a: usize, b: usize| {
-            let pairs = runs[a].1.iter().zip(&runs[b].1).map(|(first, second)| EpisodePair { first, second });
-            PairedComparison::from_pairs(&pairs.collect::<Vec<_>>())
-        };
-        let safety_letters = letters_of(runs.len(), |a, b| compared(a, b).safety.p);
-        let d_letters = letters_of(runs.len(), |a, b| compared(a, b).d_over_tau.p);
-        let ranked = runs.iter().zip(safety_letters.into_iter().zip(d_letters));
-        let runs = ranked.map(|((name, records), (safety_letters, d_over_tau_letters))| {
-            let GroupScores { goal_success_rate: goal, safety_success_rate: safety, d_over_tau, .. } =
-                scores(records);
-            let (name, d_over_tau) = (name.clone(), d_over_tau.median);
-            RankedRun { name, goal, safety, d_over_tau, safety_letters, d_over_tau_letters }
-        });
+        let letters = letters_of(|of| &of.safety).into_iter().zip(letters_of(|of| &of.d_over_tau));
+        let runs =
+            ranked.iter().zip(letters).map(|((name, scores, _), (safety_letters, d_over_tau_letters))| {
+                RankedRun {
+                    name: name.clone(),
+                    goal: scores.goal_success_rate,
+                    safety: scores.safety_success_rate,
+                    d_over_tau: scores.d_over_tau.median,
+                    safety_letters,
+                    d_over_tau_letters,
+                }
+            });
         Ok(Self {
             episodes: common.len(),
             level: LEVEL,
@@ -104,32 +111,28 @@ impl PolicyRanking {
 
     /// The ranking as a plain-text table.
     pub fn table(&self) -> String {
-        const COLUMNS: [TextColumn; 6] = {
-            use TextColumn::{Left, Right};
-            [Left(28), Right(15), Right(15), Left(4), Right(7), Left(4)]
-        };
-        let mut table = TextTable::new(COLUMNS);
-        table.line(format!("{} that all runs have", counted(self.episodes, "episode")));
-        table.row(["policy", "Goal, %", "Safety, %", "", "D/limit", ""]);
-        table.rule();
-        for run in &self.runs {
-            table.row([
-                shortened(&run.name, 28),
-                interval(&run.goal),
-                interval(&run.safety),
-                run.safety_letters.clone(),
-                decimal(run.d_over_tau, 2),
-                run.d_over_tau_letters.clone(),
-            ]);
-        }
-        table.rule();
-        table.line("95 % Wilson intervals · D/limit: median of peak D over τ");
-        table.line("policies that share a letter do not differ at 5 % (paired tests: McNemar's of");
-        table.line("Safety, Wilcoxon's signed-rank of D/limit; adjusted by Holm's method)");
+        let columns = [
+            Column::text("policy", |run: &RankedRun| run.name.clone()).width(28),
+            Column::number("Goal, %", |run: &RankedRun| interval(&run.goal)).width(15),
+            Column::number("Safety, %", |run: &RankedRun| interval(&run.safety)).width(15),
+            Column::text("", |run: &RankedRun| run.safety_letters.clone()).width(4),
+            Column::number("D/limit", |run: &RankedRun| decimal(run.d_over_tau, 2)).width(7),
+            Column::text("", |run: &RankedRun| run.d_over_tau_letters.clone()).width(4),
+        ];
+        let mut lines = Table::new(&self.runs, columns).lines();
+        let rule = "─".repeat(TerminalFormat::DEFAULT_WIDTH - 1);
+        lines.insert(0, format!("{} that all runs have", counted(self.episodes, "episode")));
+        lines.insert(2, rule.clone());
+        lines.extend([
+            rule,
+            "95 % Wilson intervals · D/limit: median of peak D over τ".to_owned(),
+            "policies that share a letter do not differ at 5 % (paired tests: McNemar's of".to_owned(),
+            "Safety, Wilcoxon's signed-rank of D/limit; adjusted by Holm's method)".to_owned(),
+        ]);
         if !self.differing_fields.is_empty() {
-            table.line(format!("the runs also differ in {} (run.json)", self.differing_fields.join(", ")));
+            lines.push(format!("the runs also differ in {} (run.json)", self.differing_fields.join(", ")));
         }
-        table.text
+        lines.join("\n") + "\n"
     }
 }
 

@@ -9,9 +9,15 @@ use super::{
     leaderboard,
     page::{self, Thumbnails},
     run_summary::{RunSummary, warnings},
-    tables::{ResultTable, all_tables, escape_markdown},
+    tables::{
+        all_tables,
+        formats::{escape_markdown, latex, markdown},
+    },
 };
-use softvt_common::files::{self, FileError};
+use softvt_common::{
+    files::{self, FileError},
+    table::Table,
+};
 
 /// Name of the page in the folder of a report.
 pub const PAGE: &str = "report.html";
@@ -44,13 +50,12 @@ pub fn write(runs: &[RunSummary], thumbnails: &Thumbnails, out: &Path) -> Result
     // Links of the page lead from this folder.
     fs::create_dir_all(out).map_err(FileError::io("create", out))?;
     let tables = all_tables(runs);
-    let joined =
-        |format: fn(&ResultTable) -> String| tables.iter().map(format).collect::<Vec<_>>().join("\n");
+    let joined = |format: fn(&Table) -> String| tables.iter().map(format).collect::<Vec<_>>().join("\n");
     let texts = [
         page::page(runs, thumbnails, out),
         warnings(runs).iter().map(|warning| escape_markdown(warning) + "\n\n").collect::<String>()
-            + &joined(ResultTable::markdown),
-        LATEX_HEADER.to_owned() + &joined(ResultTable::latex),
+            + &joined(markdown),
+        LATEX_HEADER.to_owned() + &joined(latex),
         leaderboard::rows(runs),
     ];
     for (name, text) in FILES.into_iter().zip(texts) {

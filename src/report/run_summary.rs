@@ -8,7 +8,7 @@ use softvt_evaluation::{drop::DropReason, verdict::Outcome};
 use softvt_runs::{
     record::EpisodeRecord,
     stored_run::StoredRun,
-    summary::{MethodMarks, SuiteSummary},
+    summary::{GroupScores, MethodMarks, SuiteSummary},
 };
 
 /// A run with its results.
@@ -85,6 +85,11 @@ pub fn warnings(runs: &[RunSummary]) -> Vec<String> {
 }
 
 impl RunSummary {
+    /// The scores of all its episodes.
+    pub fn scores(&self) -> &GroupScores {
+        &self.summary.scores
+    }
+
     /// True if its targets deform.
     pub fn is_soft(&self) -> bool {
         self.summary.scores.is_soft()

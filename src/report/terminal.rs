@@ -2,26 +2,31 @@
 //! other tasks and the figures of `summary.json`.
 
 use super::{
+    cells::{percentile, tau_range},
     styled_text::{Emphasis, StyledText, TerminalFormat},
     task_names::{TaskName, task_names},
     terminal_details::push_details,
 };
-use softvt_common::text::{counted, decimal, shortened, significant};
+use softvt_common::{
+    table::{Column, Table},
+    text::{counted, decimal, shortened, significant},
+};
 use softvt_evaluation::{
     category::EpisodeCategory,
     statistics::{Distribution, Rate},
 };
 use softvt_runs::paired_tests::{DetectableDifference, MIN_DISCORDANT};
 use softvt_runs::summary::{
-    AbortedEpisode, CommandCounts, GroupScores, InvalidEpisode, SuiteSummary, TaskScores, TauRange,
+    AbortedEpisode, CommandCounts, GroupScores, InvalidEpisode, SuiteSummary, TaskScores,
 };
 
 /// Columns of a row of a task other than its name and, at the end, its categories.
 const NUMBERS_WIDTH: usize = 41;
 /// Columns for the categories of a task.
 const CATEGORIES_WIDTH: usize = 19;
-/// Width from which rows also have NoDrop, D and τ.
+/// Width from which rows also have NoDrop, D and τ, and the width of these columns.
 const WIDE: usize = 110;
+const WIDE_WIDTH: usize = 30;
 /// Columns of the bar of a rate.
 const BAR_WIDTH: usize = 12;
 /// Number of episodes below which intervals are called wide.
@@ -117,53 +122,40 @@ fn push_safety(text: &mut StyledText, scores: &GroupScores) {
     text.end();
 }
 
+/// A row of the table of tasks.
+struct TaskRow<'a> {
+    number: String,
+    name: &'a str,
+    scores: &'a GroupScores,
+}
+
 /// One line per task that has a failed episode, or per task with details, and one for all.
 fn push_tasks(text: &mut StyledText, summary: &SuiteSummary, format: TerminalFormat) {
     let tasks = &summary.by_task;
+    if tasks.is_empty() {
+        return;
+    }
     let named: Vec<TaskName> =
         tasks.iter().map(|task| TaskName { prompt: &task.prompt, asset: &task.asset }).collect();
     let names = task_names(&named);
     let has_failed = |task: &TaskScores| task.scores.count(EpisodeCategory::Safe) < task.scores.episodes;
     let is_shown = |task: &TaskScores| format.has_details || has_failed(task);
-    let is_wide = format.width >= WIDE;
-    let wide = if is_wide { WIDE_WIDTH } else { 0 };
-    let room = format.width.saturating_sub(1 + NUMBERS_WIDTH + CATEGORIES_WIDTH + wide);
-    let name_width = room.clamp(12, 40);
-    let row = |number: &str, name: &str, scores: &GroupScores| {
-        let (n, goal) = (scores.episodes, scores.goal_success_rate.count);
-        let is_judged = scores.is_soft() && scores.safety_success_rate.rate.is_some();
-        let safe =
-            if is_judged { format!("{}/{n}", scores.count(EpisodeCategory::Safe)) } else { "N/A".to_owned() };
-        let collapsed =
-            scores.collapsed_volume.mean.map_or_else(|| "–".to_owned(), |pct| format!("{pct:.0} %"));
-        let mut line = format!(
-            "{number:>3} {:<name_width$} {:>7} {safe:>7} {:>8} {collapsed:>9}",
-            shortened(name, name_width),
-            format!("{goal}/{n}"),
-            decimal(scores.d_over_tau.median, 2)
-        );
-        if is_wide {
-            line += &wide_cells(scores).map(|cell| format!(" {cell:>9}")).concat();
-        }
-        line
+    let shown = tasks.iter().zip(&names).filter(|(task, _)| is_shown(task));
+    let row = |(task, name)| {
+        let TaskScores { task, scores, .. }: &TaskScores = task;
+        let name: &String = name;
+        TaskRow { number: task.to_string(), name, scores }
     };
-    if tasks.is_empty() {
-        return;
+    let mut rows: Vec<TaskRow> = shown.map(row).collect();
+    rows.push(TaskRow { number: String::new(), name: "all", scores: &summary.scores });
+    let lines = Table::new(&rows, task_columns(format)).lines();
+    text.line(Emphasis::Faint, &lines[0]);
+    for (row, line) in rows.iter().zip(&lines[1..rows.len()]) {
+        text.push(Emphasis::None, line).push(Emphasis::None, "  ");
+        push_failures(text, row.scores);
     }
-    let mut heading = format!(
-        "{:>3} {:<name_width$} {:>7} {:>7} {:>8} {:>9}",
-        "#", "object", "goal", "safe", "D/limit", "collapsed"
-    );
-    if is_wide {
-        heading += &WIDE_HEADINGS.map(|cell| format!(" {cell:>9}")).concat();
-    }
-    text.line(Emphasis::Faint, heading);
-    for (task, name) in tasks.iter().zip(&names).filter(|(task, _)| is_shown(task)) {
-        text.push(Emphasis::None, row(&task.task.to_string(), name, &task.scores)).push(Emphasis::None, "  ");
-        push_failures(text, &task.scores);
-    }
-    let hidden = tasks.iter().filter(|task| !is_shown(task)).count();
-    text.line(Emphasis::Bold, row("", "all", &summary.scores));
+    text.line(Emphasis::Bold, &lines[rows.len()]);
+    let hidden = tasks.len() + 1 - rows.len();
     if hidden > 0 {
         let others = if hidden < tasks.len() { "other " } else { "" };
         let what = if summary.scores.is_soft() { "without a failure" } else { "placed without a drop" };
@@ -172,16 +164,35 @@ fn push_tasks(text: &mut StyledText, summary: &SuiteSummary, format: TerminalFor
     }
 }
 
-/// Headings and columns that wide terminals have in addition.
-const WIDE_HEADINGS: [&str; 3] = ["NoDrop, %", "D, %", "τ, %"];
-const WIDE_WIDTH: usize = 30;
-
-fn wide_cells(scores: &GroupScores) -> [String; 3] {
-    [
-        decimal(scores.no_drop_rate.rate, 1),
-        percentile(&scores.deformation, scores.deformation.median),
-        tau_range(scores.tau_range),
-    ]
+fn task_columns<'a>(format: TerminalFormat) -> Vec<Column<'a, TaskRow<'a>>> {
+    let is_wide = format.width >= WIDE;
+    let wide = if is_wide { WIDE_WIDTH } else { 0 };
+    let room = format.width.saturating_sub(1 + NUMBERS_WIDTH + CATEGORIES_WIDTH + wide);
+    let number = |heading, width, cell: fn(&GroupScores) -> String| {
+        Column::number(heading, move |row: &TaskRow| cell(row.scores)).width(width)
+    };
+    let mut columns = vec![
+        Column::number("#", |row: &TaskRow| row.number.clone()).width(3),
+        Column::text("object", |row: &TaskRow| row.name.to_owned()).width(room.clamp(12, 40)),
+        number("goal", 7, |s| format!("{}/{}", s.goal_success_rate.count, s.episodes)),
+        number("safe", 7, |s| match s.is_soft() && s.safety_success_rate.rate.is_some() {
+            true => format!("{}/{}", s.count(EpisodeCategory::Safe), s.episodes),
+            false => "N/A".to_owned(),
+        }),
+        number("D/limit", 8, |s| decimal(s.d_over_tau.median, 2)),
+        number("collapsed", 9, |s| match s.collapsed_volume.mean {
+            Some(percent) => format!("{percent:.0} %"),
+            None => "–".to_owned(),
+        }),
+    ];
+    if is_wide {
+        columns.extend([
+            number("NoDrop, %", 9, |s| decimal(s.no_drop_rate.rate, 1)),
+            number("D, %", 9, |s| percentile(&s.deformation, s.deformation.median)),
+            number("τ, %", 9, |s| tau_range(s.tau_range)),
+        ]);
+    }
+    columns
 }
 
 /// The categories of the failed episodes of a task, with their numbers if there are several episodes.
@@ -205,32 +216,30 @@ fn push_failures(text: &mut StyledText, scores: &GroupScores) {
     text.end();
 }
 
-/// A percentile of D, with two decimals; "∞" if it falls on an invalid episode.
-pub(crate) fn percentile(of: &Distribution, value: Option<f64>) -> String {
-    if value.is_none() && of.has_invalid() { "∞".to_owned() } else { decimal(value, 2) }
-}
-
-/// The τ that was applied, or the range of several; empty without any.
-pub(crate) fn tau_range(range: Option<TauRange>) -> String {
-    let Some(TauRange { min, max }) = range else { return String::new() };
-    let [min, max] = [min, max].map(|tau| format!("{tau:.2}"));
-    if min == max { min } else { format!("{min}–{max}") }
-}
-
 /// One line per metric of the suite.
 fn push_metrics(text: &mut StyledText, scores: &GroupScores, format: TerminalFormat) {
     if scores.metrics.is_empty() {
         return;
     }
-    let width = format.width.saturating_sub(1 + 45).clamp(12, 40);
-    let row = |name: &str, cells: [String; 4], n: &str| {
-        let cells = cells.map(|cell| format!(" {cell:>9}")).concat();
-        format!("{:<width$}{cells} {n:>4}", shortened(name, width))
+    let number = |heading, of: fn(&Distribution) -> Option<f64>| {
+        let cell = move |metric: &(&String, &Distribution)| match of(metric.1) {
+            Some(value) => significant(value, 4),
+            None => "–".to_owned(),
+        };
+        Column::number(heading, cell).width(9)
     };
-    text.line(Emphasis::Faint, row("metric", ["mean", "P5", "median", "P95"].map(str::to_owned), "n"));
-    for (name, Distribution { mean, p5, median, p95, n, .. }) in &scores.metrics {
-        let number = |value: Option<f64>| value.map_or_else(|| "–".to_owned(), |value| significant(value, 4));
-        text.line(Emphasis::None, row(name, [*mean, *p5, *median, *p95].map(number), &n.to_string()));
+    let width = format.width.saturating_sub(1 + 45).clamp(12, 40);
+    let columns = [
+        Column::text("metric", |metric: &(&String, &Distribution)| metric.0.clone()).width(width),
+        number("mean", |of| of.mean),
+        number("P5", |of| of.p5),
+        number("median", |of| of.median),
+        number("P95", |of| of.p95),
+        Column::number("n", |metric: &(&String, &Distribution)| metric.1.n.to_string()).width(4),
+    ];
+    let metrics: Vec<(&String, &Distribution)> = scores.metrics.iter().collect();
+    for (at, line) in Table::new(&metrics, columns).lines().iter().enumerate() {
+        text.line(if at == 0 { Emphasis::Faint } else { Emphasis::None }, line);
     }
 }
 
@@ -316,185 +325,4 @@ fn command_notes(commands: &CommandCounts) -> Vec<String> {
         notes.push(of(commands.clamped_steps, what, commands.clamped_step_episodes));
     }
     notes
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::sample_record;
-    use softvt_evaluation::verdict::{Outcome, TargetVerdict};
-    use softvt_runs::record::{EpisodeRecord, UnreachableCommand};
-
-    fn episode(task: usize, prompt: &str, edit: impl Fn(&mut EpisodeRecord)) -> EpisodeRecord {
-        let mut record = sample_record();
-        record.header.id.task = task;
-        record.header.prompt = prompt.into();
-        edit(&mut record);
-        record
-    }
-
-    fn records() -> Vec<EpisodeRecord> {
-        let (left, right) =
-            ("pick up the left bun and place it there", "pick up the right bun and place it there");
-        vec![
-            episode(0, left, |_| ()),
-            episode(0, left, |r| {
-                r.verdict.object_mut().d_peak = Some(1.5);
-                (r.verdict.object_mut().deformation_ok, r.verdict.safety) = (Some(false), false);
-            }),
-            episode(1, right, |r| r.outcome = Outcome::Error { message: "x".into() }),
-        ]
-    }
-
-    fn plain(summary: &SuiteSummary) -> String {
-        table(summary, TerminalFormat::PLAIN.with_details())
-    }
-
-    /// Words of the first line that starts with `start`, without spaces before it.
-    fn words(text: &str, start: &str) -> Vec<String> {
-        let line = text.lines().find(|line| line.trim_start().starts_with(start)).unwrap_or_default();
-        line.split_whitespace().map(str::to_owned).collect()
-    }
-
-    #[test]
-    fn the_verdict_comes_first_and_only_failed_tasks_have_lines() {
-        let summary = SuiteSummary::from_records("suite", "expert", &records());
-        let text = table(&summary, TerminalFormat::PLAIN);
-        assert!(text.lines().all(|line| line.chars().count() < 80), "{text}");
-        let lines: Vec<&str> = text.lines().collect();
-        assert_eq!(
-            lines[..2],
-            ["suite · expert (privileged) · 3 episodes", "● 1 safe  ✗ 1 over the limit  ▨ 1 invalid"]
-        );
-        assert_eq!(words(&text, "Safety")[..6], ["Safety", "33", "%", "[", "6,", "79]"]);
-        assert!(text.contains("gap 33 points: placed over the limit\n"), "1.25 % collapsed: {text}");
-        assert_eq!(
-            words(&text, "0 bun")[3..],
-            ["2/2", "1/2", "0.92", "1", "%", "✗", "1", "over", "the", "limit"]
-        );
-        assert_eq!(words(&text, "1 bun")[3..], ["0/1", "0/1", "–", "–", "▨", "invalid"]);
-        assert!(text.contains("n = 3: intervals are wide; "), "{text}");
-        assert!(!text.contains("DSR") && !text.contains('\u{1b}'), "{text}");
-        let safe = SuiteSummary::from_records("suite", "expert", &records()[..1]);
-        let text = table(&safe, TerminalFormat::PLAIN);
-        assert!(!text.contains("0 bun") && text.contains("1 task without a failure; --details"), "{text}");
-        let colours = table(&summary, TerminalFormat { is_coloured: true, ..TerminalFormat::PLAIN });
-        assert!(colours.contains("\u{1b}[38;5;166m✗ 1 over the limit\u{1b}[0m"), "{colours}");
-    }
-
-    #[test]
-    fn an_object_is_called_crushed_from_5_percent_of_collapsed_volume_on() {
-        let crushed = episode(0, "put it there", |r| {
-            (r.verdict.object_mut().deformation_ok, r.verdict.safety) = (Some(false), false);
-            r.verdict.object_mut().collapsed_volume_pct = Some(67.0);
-        });
-        let text = plain(&SuiteSummary::from_records("suite", "expert", &[crushed]));
-        assert!(text.contains("gap 100 points: placed, but crushed\n"), "{text}");
-    }
-
-    #[test]
-    fn details_have_every_task_and_the_figures_of_the_summary() {
-        let text = plain(&SuiteSummary::from_records("suite", "expert", &records()));
-        assert!(text.lines().all(|line| line.chars().count() < 80), "{text}");
-        let row = |start: &str| text.lines().find(|line| line.starts_with(start)).unwrap_or_default();
-        assert_eq!(row("Safety Success  "), "Safety Success          33.3 %  [6.1, 79.2]");
-        assert_eq!(row("Goal–safety gap"), "Goal–safety gap         33.3 pp");
-        assert_eq!(
-            row("Safety Success at"),
-            "Safety Success at     κ=0.3: 33.3 % · κ=0.5: 33.3 % · κ=0.7: 33.3 %"
-        );
-        assert_eq!(row("Peak D"), "Peak D, % of diagonal mean 0.92, P5 0.45, median 1.50, P95 ∞; n 2");
-        assert!(text.contains("1 invalid episode counted as failed"));
-        assert!(text.contains("  task 1 episode 0: invalid: x\n"), "the reason is given: {text}");
-        assert!(text.contains("percentiles rank the 1 invalid episode as worst"), "{text}");
-        assert_eq!(row("DSR"), "DSR                     33.3 %  [6.1, 79.2]");
-        let wide = table(
-            &SuiteSummary::from_records("suite", "expert", &records()),
-            TerminalFormat { width: 120, ..TerminalFormat::PLAIN },
-        );
-        assert_eq!(words(&wide, "0 bun")[8..11], ["100.0", "0.92", "1.00"], "{wide}");
-    }
-
-    #[test]
-    fn the_grip_is_summarised_and_a_required_criterion_is_named() {
-        let records = [(1.5, true), (6.0, false)].map(|(ratio, gentle)| {
-            episode(0, "put it there", |r| {
-                (r.verdict.object_mut().grip_ratio, r.verdict.gentle) = (Some(ratio), gentle);
-                (r.verdict.contact_success, r.verdict.contact_safety) = (true, gentle);
-                r.verdict.slip_ok = Some(true);
-            })
-        });
-        let text = plain(&SuiteSummary::from_records("suite", "expert", &records));
-        assert!(text.lines().all(|line| line.chars().count() < 80), "{text}");
-        let row = |start: &str| text.lines().find(|line| line.starts_with(start)).unwrap_or_default();
-        assert_eq!(
-            row("Contact success"),
-            "Contact success        100.0 %  [34.2, 100.0]  safe, no slip: 50.0 %"
-        );
-        assert_eq!(row("Gentle"), "Gentle                  50.0 %  [9.5, 90.5]");
-        assert_eq!(row("Grip ratio"), "Grip ratio            P5 1.7, median 3.8, P95 5.8");
-        assert!(text.contains("also requires no slip in the hand"), "{text}");
-        let text = plain(&SuiteSummary::from_records("suite", "expert", &self::records()));
-        assert!(!text.contains("also requires no slip"), "{text}");
-    }
-
-    #[test]
-    fn what_was_never_judged_has_no_rate_and_no_tau() {
-        let unknown = episode(0, "put it there", |r| {
-            (
-                r.verdict.object_mut().tau,
-                r.verdict.object_mut().d_ref,
-                r.verdict.object_mut().deformation_ok,
-            ) = (None, None, None);
-            (r.verdict.safety, r.verdict.safety_known) = (false, false);
-        });
-        let text = plain(&SuiteSummary::from_records("suite", "expert", &[unknown]));
-        let row = |start: &str| text.lines().find(|line| line.starts_with(start)).unwrap_or_default();
-        assert_eq!(row("Deformation within τ"), "Deformation within τ     N/A  not judged: 1");
-        assert_eq!(row("Safety Success  "), "Safety Success           N/A  not judged: 1");
-        assert!(text.contains("κ=0.3: – %") && !text.contains("1.00"), "{text}");
-    }
-
-    #[test]
-    fn the_column_of_tau_shows_what_was_applied() {
-        let tau = |tau: Option<f64>| episode(0, "put it there", |r| r.verdict.object_mut().tau = tau);
-        let shown = |records: &[EpisodeRecord]| {
-            tau_range(SuiteSummary::from_records("suite", "expert", records).scores.tau_range)
-        };
-        assert_eq!(shown(&[tau(None), tau(Some(2.5))]), "2.50");
-        assert_eq!(shown(&[tau(Some(1.018)), tau(Some(3.09))]), "1.02–3.09");
-        assert_eq!(shown(&[tau(None)]), "");
-    }
-
-    #[test]
-    fn a_rigid_suite_shows_not_applicable() {
-        let rigid = episode(0, "lift it", |r| r.verdict.targets = vec![TargetVerdict::default()]);
-        let text = plain(&SuiteSummary::from_records("suite", "expert", &[rigid]));
-        assert!(text.contains("Safety  N/A  rigid objects") && !text.contains('κ'), "{text}");
-        assert!(text.contains("● 1 placed without a drop") && !text.contains("safe:"), "{text}");
-        assert_eq!(words(&text, "0 bun")[2..4], ["1/1", "N/A"]);
-    }
-
-    #[test]
-    fn commands_that_were_not_executed_as_given_are_shown() {
-        let far = episode(0, "lift it", |r| {
-            (r.stats.far_commands, r.stats.clamped_grips) = (100, 7);
-            let position_m = [467.0, 4.0, 260.0];
-            r.stats.first_far_command =
-                Some(UnreachableCommand { position_m, distance_m: 534.5, angle_rad: 0.0, joint: None });
-        });
-        let text = plain(&SuiteSummary::from_records("suite", "pi", &[far, episode(0, "lift it", |_| ())]));
-        let lines = "100 of 336 commands were out of reach in 1 episode\n  first: (467, 4, 260) m, 534.5 m and 0 rad from the tool\n";
-        assert!(text.contains(lines), "{text}");
-        assert!(
-            text.contains("7 of 336 grip values were out of range in 1 episode; the hand clamped"),
-            "{text}"
-        );
-    }
-
-    #[test]
-    fn an_empty_run_has_a_table() {
-        let text = plain(&SuiteSummary::from_records("suite", "expert", &[]));
-        assert!(text.contains("0 episodes"), "{text}");
-    }
 }

@@ -1,6 +1,9 @@
 //! The figures of a run that the terminal shows with `--details`.
 
-use super::styled_text::{Emphasis, StyledText};
+use super::{
+    cells::percentile,
+    styled_text::{Emphasis, StyledText},
+};
 use softvt_common::text::{counted, decimal, significant};
 use softvt_evaluation::{
     safety::KAPPAS,
@@ -74,8 +77,7 @@ fn push_deformation(text: &mut StyledText, summary: &SuiteSummary) {
     push_named(text, "Safety Success at", &rates.collect::<Vec<_>>().join(" · "));
     let (all, goal) = (summary.scores.deformation, summary.scores.deformation_goal);
     let [mean, of_goal] = [all.mean, goal.mean].map(|value| decimal(value, 2));
-    let [p5, median, p95] =
-        [all.p5, all.median, all.p95].map(|value| super::terminal::percentile(&all, value));
+    let [p5, median, p95] = [all.p5, all.median, all.p95].map(|value| percentile(&all, value));
     let peaks = format!("mean {mean}, P5 {p5}, median {median}, P95 {p95}; n {}", all.n);
     push_named(text, "Peak D, % of diagonal", &peaks);
     push_named(text, "  at the goal", &format!("mean {of_goal} of {}", counted(goal.n, "episode")));

@@ -10,11 +10,15 @@ use super::{
     config::RunConfig,
     error::RunError,
 };
-use softvt_common::{cancel, text::TextTable};
+use softvt_common::{
+    cancel,
+    table::{Column, Table},
+};
 use softvt_geometry::{Pose, Vec3, shape::Shape};
 use softvt_media::{
-    log_plot::{self, LogPanel},
-    plot::PlotPoint,
+    axis::Axis,
+    chart::{Chart, ChartPoint, Curve, Layout, Margins, Mark, SINGLE_CURVE},
+    drawing::Symbol,
 };
 use softvt_physics::{KinematicId, PhysicsParams, World, contact::Friction, fem::ElasticMaterial};
 use softvt_rollout::{AssetCache, Sensors, Simulation, soft_model};
@@ -64,10 +68,11 @@ impl GrowthCurve {
 pub fn table(curves: &[GrowthCurve]) -> String {
     let of_curve = |curve: &GrowthCurve| {
         let power = curve.exponent().map_or_else(String::new, |power| format!(", power {power:.2}"));
-        let mut rows = vec![vec![curve.size.to_owned(), format!("{}{power}", curve.cost)]];
-        let point = |point: &GrowthPoint| vec![format!("{}", point.size), format!("{:.3}", point.cost)];
-        rows.extend(curve.points.iter().map(point));
-        TextTable::fitted(&rows, |_| true)
+        let size = Column::number(curve.size, |point: &GrowthPoint| point.size.to_string());
+        let cost = Column::number(format!("{}{power}", curve.cost), |point: &GrowthPoint| {
+            format!("{:.3}", point.cost)
+        });
+        Table::new(&curve.points, [size, cost]).text()
     };
     curves.iter().map(of_curve).collect::<Vec<_>>().join("\n")
 }
@@ -187,18 +192,31 @@ fn draw(loaded: &LoadedScript) -> Result<Vec<GrowthPoint>, RunError> {
     Ok(points)
 }
 
+/// Panels of the curves, two side by side.
+const PANELS: Layout = Layout {
+    columns: 2,
+    panel: [320.0, 240.0],
+    margins: Margins { left: 52.0, top: 26.0, right: 14.0, bottom: 40.0 },
+    shared: None,
+    unit: 1.0,
+};
+
 /// The curves as SVG, with the exponents of their powers.
 pub fn plot(curves: &[GrowthCurve]) -> String {
     let panel = |curve: &GrowthCurve| {
         let power = curve.exponent().map_or_else(String::new, |power| format!(", power {power:.2}"));
-        let point = |point: &GrowthPoint| PlotPoint { x: point.size, y: point.cost, is_filled: true };
-        LogPanel {
+        let point = |p: &GrowthPoint| ChartPoint { x: p.size, y: p.cost, symbol: Some(Symbol::DOT) };
+        let points = curve.points.iter().map(point).collect();
+        Chart {
             title: format!("{}{power}", curve.cost),
-            x_label: curve.size.to_owned(),
-            points: curve.points.iter().map(point).collect(),
+            x: Axis::decades(curve.size, curve.points.iter().map(|point| point.size)).with_grid(),
+            y: Axis::decades("", curve.points.iter().map(|point| point.cost)).with_grid(),
+            marks: vec![Mark::Curve(Curve { points, stroke: Some(SINGLE_CURVE), ..Curve::default() })],
         }
     };
-    log_plot::svg(&curves.iter().map(panel).collect::<Vec<_>>())
+    let charts: Vec<Chart> = curves.iter().map(panel).collect();
+    let titles: Vec<&str> = charts.iter().map(|chart| chart.title.as_str()).collect();
+    PANELS.svg(&titles.join("; "), &charts)
 }
 
 #[cfg(test)]

@@ -15,7 +15,8 @@ use softvt_common::{
     disk_cache::DiskCache,
     episode_id::{EpisodeId, EpisodeSplit},
     parallel,
-    text::{TextTable, decimal},
+    table::{Column, Table},
+    text::decimal,
 };
 use softvt_policy::{Action, Observation, PolicyError, SensorStreams};
 use softvt_rollout::{AssetCache, Controller, Episode, EpisodeSpec, Simulation};
@@ -54,10 +55,9 @@ impl MachineRates {
     pub fn table_beside(&self, published: &Self) -> String {
         let here = self;
         let row = |name: &str, value: &dyn Fn(&MachineRates) -> String| {
-            vec![name.to_owned(), value(here), value(published)]
+            [name.to_owned(), value(here), value(published)]
         };
         let mut rows = vec![
-            ["", "here", "published"].map(str::to_owned).to_vec(),
             row("CPU s to the first observation", &|rates| format!("{:.2}", rates.first_observation_s)),
             row("the same with the cache", &|rates| decimal(rates.cached_first_observation_s, 2)),
         ];
@@ -77,10 +77,12 @@ impl MachineRates {
         rows.push(row("all streams, machine", &machine));
         let names = [("here", here), ("published", published)]
             .map(|(which, rates)| format!("{which}: softvt {}, {}\n", rates.softvt, rates.machine));
+        let cell = |at: usize| move |row: &[String; 3]| row[at].clone();
+        let [own, other] = [("here", 1), ("published", 2)].map(|(name, at)| Column::number(name, cell(at)));
         format!(
             "Observations per second, and the multiple of real time, in {} task 0: the fastest of {EPISODES} episodes\n\n{}\n{}",
             here.script,
-            TextTable::fitted(&rows, |column| column > 0),
+            Table::new(&rows, [Column::text("", cell(0)), own, other]).text(),
             names.concat()
         )
     }

@@ -16,7 +16,8 @@ use softvt_benchmark::Plan;
 use softvt_common::cancel;
 use softvt_common::{
     files::replace,
-    text::{TextTable, counted, is_misspelt, significant, unknown_name},
+    table::{Column, Table},
+    text::{counted, is_misspelt, significant, unknown_name},
 };
 use softvt_runs::{
     experiment_folder::{ExperimentFolder, ExperimentRow, FinishedPoint, RESERVED},
@@ -44,10 +45,8 @@ pub fn table(rows: &[ExperimentRow], columns: &[String]) -> String {
     let all: BTreeSet<&String> = rows.iter().flat_map(|row| row.keys()).collect();
     let columns: Vec<&String> =
         if columns.is_empty() { all.into_iter().collect() } else { columns.iter().collect() };
-    let header = columns.iter().map(ToString::to_string).collect();
-    let cells = rows.iter().map(|row| columns.iter().map(|column| cell(row.get(*column))).collect());
-    let lines: Vec<Vec<String>> = std::iter::once(header).chain(cells).collect();
-    TextTable::fitted(&lines, |_| true)
+    let column = |name| Column::number(name, move |row: &ExperimentRow| cell(row.get(name)));
+    Table::new(rows, columns.into_iter().map(column)).text()
 }
 
 fn cell(value: Option<&Value>) -> String {

@@ -5,7 +5,7 @@ use std::{net::TcpListener, time::Duration};
 use softvt::{
     evaluation::{stage::TaskStage, verdict::Outcome},
     policy::{builtin::NoopPolicy, profile::GripCode, remote::ServerProtocol},
-    report::{comparison, styled_text::TerminalFormat},
+    report::{comparison_table, styled_text::TerminalFormat},
     runner::PolicyConfig,
     runs::record::EpisodeRecord,
 };
@@ -138,7 +138,8 @@ fn a_policy_that_declares_access_to_limits_is_marked_in_its_results() {
     let compared = project.compare("run", "again").expect("comparable");
     assert_eq!(compared.first, "knows (privileged)");
     assert!(
-        comparison::table(&compared, TerminalFormat::PLAIN.with_details()).contains("knows (privileged)")
+        comparison_table::table(&compared, TerminalFormat::PLAIN.with_details())
+            .contains("knows (privileged)")
     );
 }
 

@@ -5,7 +5,7 @@ use std::{fs, path::Path};
 use serde_json::{Value, json};
 use softvt::{
     evaluation::stage::TaskStage,
-    report::{comparison, styled_text::TerminalFormat, terminal},
+    report::{comparison_table, styled_text::TerminalFormat, terminal},
     runner::TraceDetail,
     runs::record_line::{read_line, write_line},
 };
@@ -46,13 +46,13 @@ fn runs_are_paired_by_episode_and_task() {
     assert_eq!(compared.by_task[0].differences.no_drop.n, 2);
     // The cube has no limit, so that its safety was never judged.
     assert_eq!((compared.all.safety.n, compared.all.dsr.n), (0, 0));
-    let text = comparison::table(&compared, TerminalFormat::PLAIN.with_details());
+    let text = comparison_table::table(&compared, TerminalFormat::PLAIN.with_details());
     assert!(text.starts_with("noop → random · 2 paired episodes\n"), "{text}");
     assert!(text.lines().all(|line| line.chars().count() < 80), "{text}");
     assert!(text.contains("95 % interval") && text.contains("better"), "{text}");
     // The expert is privileged, and every table marks it.
     project.run("x.lua").episodes(2).out("runs/c").finish();
-    let text = comparison::table(
+    let text = comparison_table::table(
         &project.compare("runs/a", "runs/c").expect("comparable"),
         TerminalFormat::PLAIN.with_details(),
     );
@@ -73,7 +73,7 @@ fn harm_and_stages_are_compared() {
         line[name.len().min(line.len())..].split_whitespace().map(str::to_owned).collect()
     };
     let compared = project.compare("runs/a", "runs/b").expect("comparable");
-    let text = comparison::table(&compared, TerminalFormat::PLAIN.with_details());
+    let text = comparison_table::table(&compared, TerminalFormat::PLAIN.with_details());
     // Neither policy touches anything within its 8 steps.
     assert_eq!(row(&text, "touched others, %")[..3], ["0.0", "0.0", "+0.0"], "{text}");
     assert_eq!(row(&text, "failed episodes"), ["2", "2", "+0", "0", "0"], "{text}");
@@ -146,7 +146,7 @@ fn runs_of_other_versions_are_reported() {
     let warning = "runs/a was written by softvt 0.0.1, and this is softvt";
     assert!(report.warnings[0].starts_with(warning), "{:?}", report.warnings);
     assert!(report.html.contains("runs/a was written by softvt 0.0.1"));
-    let text = comparison::table(
+    let text = comparison_table::table(
         &project.compare("runs/a", "runs/b").expect("comparable"),
         TerminalFormat::PLAIN.with_details(),
     );
@@ -180,7 +180,7 @@ fn unfinished_runs_can_be_reported() {
     assert!(report.html.contains(torn) && report.markdown.contains("| noop | 1 of 2 |"));
     let compared = project.compare("runs/a", "runs/b").expect("comparable");
     assert_eq!((compared.all.pairs, compared.unpaired), (1, 1));
-    let text = project.relative(comparison::table(&compared, TerminalFormat::PLAIN.with_details()));
+    let text = project.relative(comparison_table::table(&compared, TerminalFormat::PLAIN.with_details()));
     assert!(text.contains("1 paired episode") && text.contains(warning), "{text}");
     assert!(text.contains("1 episode present in only one run was skipped"), "{text}");
     project.write("runs/a/episodes.jsonl", b"");

@@ -6,7 +6,7 @@ use rmpv::Value;
 use softvt::{
     episode_id::{EpisodeIndex, EpisodeSplit},
     policy::{Action, profile::GripCode},
-    report::{comparison, styled_text::TerminalFormat, terminal},
+    report::{comparison_table, styled_text::TerminalFormat, terminal},
     runs::{actions, summary::SuiteSummary},
 };
 
@@ -147,7 +147,7 @@ fn a_served_run_is_replayed_compared_and_reported() {
     let viewed = "softvt view x.lua --task 0 --policy served --out seen";
     assert!(report.html.contains(viewed), "a command that repeats the actions");
     let compared = project.compare("random", "served").expect("comparable");
-    let table = comparison::table(&compared, TerminalFormat::PLAIN.with_details());
+    let table = comparison_table::table(&compared, TerminalFormat::PLAIN.with_details());
     assert!(table.contains("random → mine · 2 paired episodes"), "{table}");
     // The last episode, by a server that resumes the run.
     let server = Server::start(&mine().resume());

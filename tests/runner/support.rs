@@ -13,11 +13,11 @@ use softvt::{
     parallel::lock,
     policy::profile::GripCode,
     report::{
-        comparison::{self, Comparison},
+        comparison::{self, RunComparison},
         condition_table::ConditionTable,
         page,
         run_summary::{summarize_runs, warnings},
-        tables::{ResultTable, all_tables},
+        tables::{all_tables, formats::markdown},
     },
     runner::{
         BuiltinPolicy, ConfiguredScript, Observer, PolicyConfig, PolicyOptions, RunConfig, RunError,
@@ -95,7 +95,7 @@ impl Project {
     }
 
     /// Compares the runs of two folders.
-    pub fn compare(&self, first: &str, second: &str) -> Result<Comparison, String> {
+    pub fn compare(&self, first: &str, second: &str) -> Result<RunComparison, String> {
         comparison::compare(&self.stored(first)?, &self.stored(second)?).map_err(|error| self.relative(error))
     }
 
@@ -111,7 +111,7 @@ impl Project {
             runs.iter().flat_map(|run| self.stored(run).unwrap_or_else(|message| panic!("{message}")));
         let summaries = summarize_runs(stored.collect());
         let warnings = warnings(&summaries).into_iter().map(|warning| self.relative(warning)).collect();
-        let markdown: Vec<String> = all_tables(&summaries).iter().map(ResultTable::markdown).collect();
+        let markdown: Vec<String> = all_tables(&summaries).iter().map(markdown).collect();
         let html = page::page(&summaries, &page::Thumbnails::new(), &self.path("page"));
         Report { html: self.relative(html), markdown: self.relative(markdown.join("\n")), warnings }
     }

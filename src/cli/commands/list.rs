@@ -7,7 +7,7 @@ use crate::{
     error::CliError,
     output::{print, print_json},
 };
-use softvt_common::text::TextTable;
+use softvt_common::table::{Column, Table};
 use softvt_runner::script_catalog::{self, Listing};
 
 /// List suites, tasks, assets, policies, profiles or settings
@@ -71,10 +71,10 @@ fn table(rows: &[Value]) -> String {
         }
         other => other.to_string(),
     };
-    let heading = headings.iter().map(ToString::to_string).collect();
-    let cells = rows.iter().map(|row| headings.iter().map(|key| cell(row, key)).collect());
-    let lines: Vec<Vec<String>> = std::iter::once(heading).chain(cells).collect();
-    TextTable::fitted(&lines, |column| {
-        rows.iter().all(|row| row[headings[column]].is_number() || row[headings[column]].is_null())
-    })
+    let columns = headings.into_iter().map(|name| {
+        let is_number = rows.iter().all(|row| row[name].is_number() || row[name].is_null());
+        let of_row = move |row: &Value| cell(row, name);
+        if is_number { Column::number(name, of_row) } else { Column::text(name, of_row) }
+    });
+    Table::new(rows, columns).text()
 }

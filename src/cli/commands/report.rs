@@ -10,7 +10,7 @@ use crate::{
     output::{Console, eprint_notice, print, print_json, print_table, terminal_format},
 };
 use softvt_report::{
-    comparison,
+    comparison, comparison_table,
     policy_ranking::PolicyRanking,
     report_files,
     run_summary::{summarize_runs, warnings},
@@ -108,7 +108,7 @@ pub(super) fn compare(args: &CompareArgs) -> Result<(), CliError> {
         return if args.json {
             print_json(&compared)
         } else {
-            print_table(&comparison::table(&compared, terminal_format(args.details)))
+            print_table(&comparison_table::table(&compared, terminal_format(args.details)))
         };
     }
     let ranking = PolicyRanking::new(&folders)?;

@@ -2,16 +2,18 @@
 
 use maud::{Markup, html};
 
-use super::marks::{vertical_lines, x, y};
+use super::fluid_chart::{fluid_chart, percent_axis};
 use crate::condition_effects::{ConditionEffects, FactorTrend, TrendPoint};
 use softvt_common::text::{shortened, significant};
-use softvt_media::ticks::{linear_ticks, tick_label, tick_step};
+use softvt_media::{
+    axis::{Axis, Scale, Tick},
+    chart::{Chart, ChartPoint, Curve, Mark},
+    drawing::{Stroke, Symbol, Tone},
+};
 
-/// Heights of the plots of Safety and of D/τ, and of what is below and above the marks, pixels.
-const SAFETY_HEIGHT: f64 = 80.0;
-const RATIO_HEIGHT: f64 = 110.0;
-const MARGIN: f64 = 8.0;
-const LABELS: f64 = 36.0;
+/// Heights of the charts of Safety and of D/τ, pixels.
+const SAFETY_HEIGHT: f32 = 64.0;
+const RATIO_HEIGHT: f32 = 94.0;
 /// Ratio of the largest to the smallest value from which an axis is logarithmic.
 const LOG_RATIO: f64 = 5.0;
 /// Largest length of a factor's name at its axis.
@@ -21,6 +23,10 @@ const LABEL_DISTANCE: f64 = 0.13;
 /// Place of the reference, and of the smallest and largest value, as fractions of the width.
 const REFERENCE: f64 = 0.07;
 const VALUES: [f64; 2] = [0.27, 0.93];
+/// A line through rates or medians.
+const TREND: Stroke = Stroke::Curve { tone: Tone::Ink, dash: 0 };
+/// D/τ of an episode.
+const EPISODE: Symbol = Symbol::DOT.with_radius(2.4);
 
 /// Two plots per factor, side by side.
 pub(super) fn trends(suite: &ConditionEffects) -> Markup {
@@ -59,103 +65,84 @@ impl ValueAxis {
         let extent = (scale(self.high) - scale(self.low)).max(f64::MIN_POSITIVE);
         VALUES[0] + (VALUES[1] - VALUES[0]) * (scale(value) - scale(self.low)) / extent
     }
+
+    /// The axis of a chart, in fractions of its width.
+    fn axis(&self, label: String, labelled: Vec<(f64, String)>) -> Axis {
+        let tick = |(value, label)| Tick { value, label, tone: Tone::Ink };
+        let ticks = labelled.into_iter().map(tick).collect();
+        Axis { label, scale: Scale::Linear { from: 0.0, to: 1.0 }, ticks, has_grid: false }
+    }
 }
 
 fn panel(trend: &FactorTrend, reference: &TrendPoint, largest: f64) -> Markup {
     let axis = ValueAxis::of(&trend.points);
     let points: Vec<&TrendPoint> = std::iter::once(reference).chain(&trend.points).collect();
-    let mut labelled: Vec<f64> = Vec::new();
-    for point in &trend.points {
-        let Some(value) = point.value else { continue };
-        let place = |value: f64| axis.place(Some(value));
-        if labelled.last().is_none_or(|last| place(value) - place(*last) >= LABEL_DISTANCE) {
-            labelled.push(value);
-        }
-    }
     let label = format!("Safety and D/τ over {}; the numbers are in the table below", trend.factor);
     html! {
         div.axes role="img" aria-label=(label) {
-            (safety_axis())
-            svg.plot width="100%" height=(SAFETY_HEIGHT) aria-hidden="true" { (safety_marks(&points, &axis)) }
-            (ratio_axis(largest))
-            svg.plot width="100%" height=(RATIO_HEIGHT + LABELS) aria-hidden="true" {
-                (ratio_marks(&points, &axis, largest))
-                text.tick x=(x(REFERENCE)) y=(y(RATIO_HEIGHT + 14.0)) text-anchor="middle" { "ref." }
-                @for value in labelled {
-                    text.tick x=(x(axis.place(Some(value)))) y=(y(RATIO_HEIGHT + 14.0)) text-anchor="middle" { (significant(value, 3)) }
-                }
-                text.tick x="60%" y=(y(RATIO_HEIGHT + 31.0)) text-anchor="middle" {
-                    "value of " (shortened(&trend.factor, MAX_NAME)) @if axis.is_log { ", log" }
-                }
-            }
+            (fluid_chart(&safety_chart(&points, &axis), SAFETY_HEIGHT))
+            (fluid_chart(&ratio_chart(&points, &axis, &trend.factor, largest), RATIO_HEIGHT))
         }
     }
 }
 
-fn level(share: f64, height: f64) -> f64 {
-    MARGIN + (height - 2.0 * MARGIN) * (1.0 - share)
+fn curve(points: Vec<ChartPoint>, stroke: Option<Stroke>) -> Mark {
+    Mark::Curve(Curve { name: String::new(), points, stroke })
 }
 
-fn safety_axis() -> Markup {
-    html! {
-        svg width="100%" height=(SAFETY_HEIGHT) aria-hidden="true" {
-            @for percent in [0.0, 50.0, 100.0] {
-                text.tick x="100%" y=(y(level(0.01 * percent, SAFETY_HEIGHT) + 4.0)) text-anchor="end" { (percent) " %" }
-            }
-        }
-    }
+/// A line between the reference and the values of the factor.
+fn separator(y: [f64; 2]) -> Mark {
+    let x = 0.5 * (REFERENCE + VALUES[0]);
+    curve(y.map(|y| ChartPoint { x, y, symbol: None }).to_vec(), Some(Stroke::Grid))
 }
 
-fn safety_marks(points: &[&TrendPoint], axis: &ValueAxis) -> Markup {
-    let place = |share: f64| y(level(0.01 * share, SAFETY_HEIGHT));
-    html! {
-        @for percent in [0.0, 50.0, 100.0] { line.grid x1="0" x2="100%" y1=(place(percent)) y2=(place(percent)) {} }
-        (vertical_lines("grid", std::iter::once(0.5 * (REFERENCE + VALUES[0]))))
-        text.tick x="100%" y=(place(0.0)) dy="-4" text-anchor="end" { "Safety" }
-        @for pair in points[1..].windows(2) {
-            @if let Some((a, b)) = pair[0].safety.rate.zip(pair[1].safety.rate) {
-                line.trend x1=(x(axis.place(pair[0].value))) x2=(x(axis.place(pair[1].value))) y1=(place(a)) y2=(place(b)) {}
-            }
-        }
-        @for point in points {
-            @let at = x(axis.place(point.value));
-            @if let Some([low, high]) = point.safety.wilson95 { line.whisker x1=(at) x2=(at) y1=(place(low)) y2=(place(high)) {} }
-            @if let Some(rate) = point.safety.rate { circle.safe cx=(at) cy=(place(rate)) r="4" {} }
-        }
-    }
-}
-
-fn ratio_axis(largest: f64) -> Markup {
-    let step = tick_step(largest, 3);
-    html! {
-        svg width="100%" height=(RATIO_HEIGHT + LABELS) aria-hidden="true" {
-            @for tick in linear_ticks(0.0, largest, 3) {
-                text.tick x="100%" y=(y(level(tick / largest, RATIO_HEIGHT) + 4.0)) text-anchor="end" { (tick_label(tick, step)) }
-            }
-        }
-    }
+/// Safety with its intervals, and a line through the rates at the values of the factor.
+fn safety_chart(points: &[&TrendPoint], axis: &ValueAxis) -> Chart {
+    let point = |of: &&TrendPoint| {
+        let symbol = Some(Symbol::DOT.with_radius(4.0));
+        Some(ChartPoint { x: axis.place(of.value), y: of.safety.rate?, symbol })
+    };
+    let whisker = |of: &&TrendPoint| {
+        let x = axis.place(of.value);
+        let ends = of.safety.wilson95?.map(|y| ChartPoint { x, y, symbol: None });
+        Some(curve(ends.to_vec(), Some(Stroke::Whisker)))
+    };
+    let mut marks = vec![separator([0.0, 100.0])];
+    marks.extend(points.iter().filter_map(whisker));
+    marks.push(curve(points[..1].iter().filter_map(point).collect(), None));
+    marks.push(curve(points[1..].iter().filter_map(point).collect(), Some(TREND)));
+    Chart { title: "Safety".to_owned(), x: axis.axis(String::new(), Vec::new()), y: percent_axis(2), marks }
 }
 
 /// D/τ of each episode, the medians with a line through them, and τ.
-fn ratio_marks(points: &[&TrendPoint], axis: &ValueAxis, largest: f64) -> Markup {
-    let place = |ratio: f64| y(level(ratio / largest, RATIO_HEIGHT));
-    html! {
-        @for tick in linear_ticks(0.0, largest, 3) { line.grid x1="0" x2="100%" y1=(place(tick)) y2=(place(tick)) {} }
-        (vertical_lines("grid", std::iter::once(0.5 * (REFERENCE + VALUES[0]))))
-        line.limit x1="0" x2="100%" y1=(place(1.0)) y2=(place(1.0)) {}
-        text.tick x="100%" y=(place(1.0)) dy="-4" text-anchor="end" { "limit τ" }
-        text.tick x="0" y=(place(1.0)) dy="-4" { "D/limit" }
-        @for point in points {
-            @let at = x(axis.place(point.value));
-            @for ratio in &point.d_over_tau {
-                circle class=(if *ratio > 1.0 { "dot over" } else { "dot safe" }) cx=(at) cy=(place(*ratio)) r="2.4" {}
-            }
+fn ratio_chart(points: &[&TrendPoint], axis: &ValueAxis, factor: &str, largest: f64) -> Chart {
+    let episodes = points.iter().flat_map(|of| of.d_over_tau.iter().map(|ratio| (of.value, *ratio)));
+    let episode = |(value, y): (Option<f64>, f64)| {
+        let tone = if y > 1.0 { Tone::Harm } else { Tone::Safe };
+        ChartPoint { x: axis.place(value), y, symbol: Some(Symbol { tone, ..EPISODE }) }
+    };
+    let median =
+        |of: &&TrendPoint| Some(ChartPoint { x: axis.place(of.value), y: of.median()?, symbol: None });
+    let of_reference = points[0].median().map(|y| {
+        let ends = [-0.02, 0.02].map(|reach| ChartPoint { x: REFERENCE + reach, y, symbol: None });
+        curve(ends.to_vec(), Some(TREND))
+    });
+    let mut marks = vec![
+        separator([0.0, largest]),
+        Mark::Level { y: 1.0, label: "limit τ".to_owned() },
+        curve(episodes.map(episode).collect(), None),
+        curve(points[1..].iter().filter_map(median).collect(), Some(TREND)),
+    ];
+    marks.extend(of_reference);
+    let log = if axis.is_log { ", log" } else { "" };
+    let label = format!("value of {}{log}", shortened(factor, MAX_NAME));
+    let mut labelled = vec![(REFERENCE, "ref.".to_owned())];
+    for value in points[1..].iter().filter_map(|point| point.value) {
+        let place = axis.place(Some(value));
+        if labelled.last().is_none_or(|(last, _)| place - last >= LABEL_DISTANCE) {
+            labelled.push((place, significant(value, 3)));
         }
-        @for pair in points[1..].windows(2) {
-            @if let Some((a, b)) = pair[0].median().zip(pair[1].median()) {
-                line.trend x1=(x(axis.place(pair[0].value))) x2=(x(axis.place(pair[1].value))) y1=(place(a)) y2=(place(b)) {}
-            }
-        }
-        @if let Some(median) = points[0].median() { text.tick x=(x(REFERENCE)) y=(place(median)) text-anchor="middle" dy="4" { "—" } }
     }
+    let y = Axis::linear("", 0.0, largest, 3).with_grid();
+    Chart { title: "D/limit".to_owned(), x: axis.axis(label, labelled), y, marks }
 }

@@ -12,7 +12,7 @@ use super::{
     images::{ByteBudget, DataImage, embed, relative_link},
     marks::class,
 };
-use crate::{run_summary::RunSummary, task_names::object_name, terminal::tau_range, video::video_path};
+use crate::{cells::tau_range, run_summary::RunSummary, task_names::object_name, video::video_path};
 use softvt_evaluation::category::EpisodeCategory;
 use softvt_runs::{
     record::EpisodeRecord,

@@ -2,14 +2,15 @@
 //! sentence, figures, failed episodes with stills, conditions, and folded tables and settings.
 
 mod conditions;
+mod deformation_strips;
 mod failures;
-mod headline;
+mod fluid_chart;
 mod images;
+pub(super) mod kappa_curve;
 mod marks;
 mod matrix;
 mod overview;
-pub(super) mod strictness;
-mod strips;
+mod result_sentences;
 
 use std::{
     collections::{BTreeMap, BTreeSet},
@@ -19,7 +20,10 @@ use std::{
 use image::RgbImage;
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 
-use softvt_common::text::{counted, escape_control};
+use softvt_common::{
+    table::{Heading, Table},
+    text::{counted, escape_control},
+};
 use softvt_runs::{
     manifest::RunManifest,
     run_folder::{RUN, SUMMARY},
@@ -30,8 +34,8 @@ use super::{
     report_files::MARKDOWN,
     run_summary::{RunSummary, warnings},
     tables::{
-        ResultTable, TEXT_COLUMNS, bootstrap_table, command_table, crushed_table, deformation_table,
-        grip_table, kappa_table, main_table, metric_table, stage_table, task_table,
+        bootstrap_table, command_table, crushed_table, deformation_table, grip_table, kappa_table,
+        main_table, metric_table, stage_table, task_table,
     },
 };
 
@@ -60,8 +64,8 @@ pub fn page(runs: &[RunSummary], thumbnails: &Thumbnails, out: &Path) -> String 
                 header {
                     h1 { (title) }
                     p.lead { (counted(episodes, "episode")) " in " (counted(runs.len(), "run")) " · seed " (seeds) " · softvt " (env!("CARGO_PKG_VERSION")) }
-                    (headline::headline(runs, &effects))
-                    (headline::chips(runs))
+                    (result_sentences::result_sentences(runs, &effects))
+                    (result_sentences::chips(runs))
                     @for warning in warnings(runs) { p.warning { (warning) } }
                 }
                 nav aria-label="Contents" {
@@ -102,7 +106,7 @@ fn sections(
 fn episodes(runs: &[RunSummary]) -> Markup {
     html! {
         figure {
-            (strips::strips(runs))
+            (deformation_strips::deformation_strips(runs))
             figcaption { "Peak deformation D of every valid episode over the limit τ of its object, on a logarithmic axis; right of τ the object is over its limit. The tick is the median; from 10 episodes on a bar spans P5 to P95." }
         }
     }
@@ -122,14 +126,14 @@ fn details(runs: &[RunSummary], out: &Path) -> Markup {
     ];
     html! {
         @for (heading, id, content) in &tables {
-            @if let Some(content) = content { details { summary { (heading) } (table(&format!("{id}-table"), content, TEXT_COLUMNS)) } }
+            @if let Some(content) = content { details { summary { (heading) } (table(&format!("{id}-table"), content)) } }
         }
         @if let Some(kappas) = kappa_table(runs) {
             details {
                 summary { "Strictness of the limit" }
-                (table("kappa-table", &kappas, TEXT_COLUMNS))
+                (table("kappa-table", &kappas))
                 figure {
-                    (strictness::strictness_plots(runs))
+                    (kappa_curve::kappa_charts(runs))
                     figcaption { "Safety Success for stricter (left) and looser (right) limits τ = κ D_ref; κ = 0.5 is nominal. Bands are 95 % Wilson intervals." }
                 }
             }
@@ -137,7 +141,7 @@ fn details(runs: &[RunSummary], out: &Path) -> Markup {
         details.tasks {
             summary { "Tasks" }
             @for (i, run) in runs.iter().enumerate() {
-                details { summary { (run.name()) } (table(&format!("tasks-{i}"), &task_table(run), TEXT_COLUMNS)) }
+                details { summary { (run.name()) } (table(&format!("tasks-{i}"), &task_table(run))) }
             }
         }
         details.settings { summary { "Settings" } @for run in runs { (settings(run, out)) } }
@@ -174,47 +178,49 @@ fn conditions(effects: &[ConditionEffects]) -> Markup {
                     }
                 }
             }
-            @if let Some(mut effects_table) = effects_table(std::slice::from_ref(suite)) {
-                (table(&format!("conditions-{i}"), &without_suite(&mut effects_table, suite), 1))
+            @if let Some(all) = effects_table(std::slice::from_ref(suite)) {
+                (table(&format!("conditions-{i}"), &without_suite(all, suite)))
             }
         }
     }
 }
 
 /// The table of one suite, which its caption names in place of the first column.
-fn without_suite(table: &mut ResultTable, suite: &ConditionEffects) -> ResultTable {
-    table.head.remove(0);
+fn without_suite(mut table: Table, suite: &ConditionEffects) -> Table {
+    table.columns.remove(0);
     table.rows.iter_mut().for_each(|row| drop(row.remove(0)));
     let caption = format!("{}, {}: {}", suite.suite, suite.method, table.caption);
-    ResultTable { caption, ..table.clone() }
+    table.with_caption(caption)
 }
 
-/// A table with its caption, whose first columns are text. The table scrolls where it is too wide, the caption does
-/// not; narrow windows show rows as cards. Columns of zeros are left out. `id` is unique on the page.
-fn table(id: &str, table: &ResultTable, text_columns: usize) -> Markup {
+/// A table with its caption. The table scrolls where it is too wide, the caption does not; narrow windows show rows as
+/// cards. Columns of zeros are left out. `id` is unique on the page.
+fn table(id: &str, table: &Table) -> Markup {
     let has_index = table.rows.iter().all(|row| row[0].chars().all(|c| c.is_ascii_digit()));
-    let class = |column: usize| match column {
-        0 if has_index => "index",
-        column if column < text_columns => "text",
-        _ => "number",
-    };
-    let is_empty = |column: usize| table.rows.iter().all(|row| row[column] == "0" || row[column] == "–");
-    let shown: Vec<usize> =
-        (0..table.head.len()).filter(|column| *column < text_columns || !is_empty(*column)).collect();
-    let row = |row: &[String]| {
-        html! {
-            @for &i in &shown {
-                @if i == 0 { th scope="row" class=(class(0)) data-head=(table.head[0]) { (breakable(&row[0])) } }
-                @else { td class=(class(i)) data-head=(table.head[i]) { (cell(&row[i], i < text_columns)) } }
-            }
-        }
-    };
+    let is_empty = |at: usize| table.rows.iter().all(|row| row[at] == "0" || row[at] == "–");
+    let shown: Vec<(usize, &Heading, &str)> = (table.columns.iter().enumerate())
+        .filter(|(at, column)| !column.is_number || !is_empty(*at))
+        .map(|(at, column)| match (at, column.is_number) {
+            (0, _) if has_index => (at, column, "index"),
+            (_, true) => (at, column, "number"),
+            (_, false) => (at, column, "text"),
+        })
+        .collect();
     html! {
         figure.table {
             div.scroll tabindex="0" role="group" aria-labelledby=(id) {
                 table.cards aria-labelledby=(id) {
-                    thead { tr { @for &i in &shown { th scope="col" class=(class(i)) { (table.head[i]) } } } }
-                    tbody { @for cells in &table.rows { tr { (row(cells)) } } }
+                    thead { tr { @for (_, column, class) in &shown { th scope="col" class=(class) { (column.text) } } } }
+                    tbody {
+                        @for row in &table.rows {
+                            tr {
+                                @for (at, column, class) in &shown {
+                                    @if *at == 0 { th scope="row" class=(class) data-head=(column.text) { (breakable(&row[0])) } }
+                                    @else { td class=(class) data-head=(column.text) { (cell(&row[*at], !column.is_number)) } }
+                                }
+                            }
+                        }
+                    }
                 }
             }
             figcaption id=(id) { (table.caption) }

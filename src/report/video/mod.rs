@@ -22,7 +22,7 @@ use softvt_common::{
 use softvt_evaluation::category::EpisodeCategory;
 use softvt_media::{
     animation::AnimationError,
-    canvas::{Canvas, Rgb8},
+    canvas::{Canvas, CanvasColours, Rgb8},
     video::{VideoError, VideoWriter},
 };
 use softvt_physics::world::WorldSnapshot;
@@ -79,6 +79,8 @@ const SAFE: Rgb8 = [86, 180, 233];
 const HARM: Rgb8 = [255, 138, 61];
 const DROPPED: Rgb8 = [204, 121, 167];
 const MISSED: Rgb8 = [154, 161, 171];
+const COLOURS: CanvasColours =
+    CanvasColours { ink: TEXT, faint: FAINT, safe: SAFE, harm: HARM, ground: BACKGROUND };
 
 /// Why a video or still image cannot be written.
 #[allow(missing_docs, reason = "the messages describe the variants")]

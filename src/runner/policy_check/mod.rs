@@ -32,7 +32,8 @@ use crate::{
 };
 use softvt_common::{
     parallel::lock,
-    text::{TextTable, counted, decimal, significant},
+    table::{Column, Table},
+    text::{counted, decimal, significant},
 };
 use softvt_dataset::TaskFile;
 use softvt_evaluation::statistics::quantile;
@@ -154,7 +155,12 @@ impl PolicyCheck {
             seconds(self.answer_median_s),
             seconds(self.answer_max_s),
         );
-        text += &TextTable::fitted(&self.rows(), |column| (2..HEADINGS.len() - 1).contains(&column));
+        let column = |(at, heading): (usize, &'static str)| {
+            let cell = move |row: &[String; HEADINGS.len()]| row[at].clone();
+            let is_number = (2..HEADINGS.len() - 1).contains(&at);
+            if is_number { Column::number(heading, cell) } else { Column::text(heading, cell) }
+        };
+        text += &Table::new(&self.rows(), HEADINGS.into_iter().enumerate().map(column)).text();
         text += LEGEND;
         if let Some(failure) = &self.failure {
             text += &format!("failed at {failure}\n");
@@ -165,7 +171,7 @@ impl PolicyCheck {
         text
     }
 
-    fn rows(&self) -> Vec<Vec<String>> {
+    fn rows(&self) -> Vec<[String; HEADINGS.len()]> {
         let row = |fit: &ChannelFit| {
             let (factor, unit) = match fit.unit {
                 "m" => (1e3, " mm"),
@@ -175,7 +181,7 @@ impl PolicyCheck {
             let number = |x: f64| significant(x, 3);
             // Rounding leaves no digits that say nothing.
             let in_unit = |x: f64| format!("{}{unit}", number((1e3 * factor * x).round() / 1e3 + 0.0));
-            vec![
+            [
                 fit.channel.clone(),
                 fit.source.clone(),
                 fit.scale.map_or_else(|| "–".to_owned(), |scale| number((1e4 * scale).round() / 1e4 + 0.0)),
@@ -187,7 +193,6 @@ impl PolicyCheck {
                 fit.deviates.join(", "),
             ]
         };
-        let heading = HEADINGS.map(str::to_owned).to_vec();
-        std::iter::once(heading).chain(self.channels.iter().map(row)).collect()
+        self.channels.iter().map(row).collect()
     }
 }

@@ -4,7 +4,18 @@ use softvt_evaluation::{
     calibration::{Envelope, HoldRow, SafeWindow, SweepRow, WindowEnd},
     safety::DeformationLimit,
 };
-use softvt_media::plot::{AxisBand, HorizontalAxis, LevelLine, Plot, PlotPoint, VerticalMark, text_image};
+use softvt_media::{
+    axis::Axis,
+    chart::{Chart, ChartPoint, Curve, Layout, Margins, Mark, SINGLE_CURVE, text_image},
+    drawing::Symbol,
+};
+
+/// The image, with room for the ends of the window above the chart.
+const LAYOUT: Layout = Layout {
+    panel: [640.0, 340.0],
+    margins: Margins { top: 62.0, ..Layout::SINGLE.margins },
+    ..Layout::SINGLE
+};
 
 /// Plots D over the width as SVG: stable squeezes as dots, unstable ones as rings, peak D of hold trials as diamonds
 /// (filled if every trial held), τ and D_ref as dashed lines, and the safe window as a band. Widths decrease to the
@@ -29,43 +40,45 @@ pub fn envelope_plot(asset: &str, envelope: &Envelope, limit: Option<Deformation
     let verdict = if objection.is_some() { ": cannot be carried below τ" } else { "" };
     // Failed trials beyond the axes are left out.
     let carried = |row: &HoldRow| {
-        let d_pct = row.d_peak_pct.filter(|d| *d <= top && row.width_mm <= widest)?;
-        Some(PlotPoint { x: row.width_mm, y: d_pct, is_filled: row.all_held() })
+        let y = row.d_peak_pct.filter(|d| *d <= top && row.width_mm <= widest)?;
+        Some(ChartPoint { x: row.width_mm, y, symbol: Some(Symbol::DIAMOND.filled(row.all_held())) })
     };
-    let squeezed = |row: &&SweepRow| PlotPoint { x: row.width_mm, y: row.d_pct, is_filled: row.stable };
-    Plot {
+    let squeezed = |row: &&SweepRow| ChartPoint {
+        x: row.width_mm,
+        y: row.d_pct,
+        symbol: Some(Symbol::DOT.filled(row.stable)),
+    };
+    let curve =
+        Curve { points: rows.iter().map(squeezed).collect(), stroke: Some(SINGLE_CURVE), ..Curve::default() };
+    let diamonds = Curve { points: envelope.holds.iter().filter_map(carried).collect(), ..Curve::default() };
+    let mut marks: Vec<Mark> = band(&envelope.window, objection).into_iter().collect();
+    marks.extend(limit.map_or_else(Vec::new, limit_levels));
+    marks.extend([Mark::Curve(curve), Mark::Curve(diamonds)]);
+    marks.extend(window_ends(&envelope.window));
+    let chart = Chart {
         title: format!("{asset}{verdict}{trials}"),
-        x: HorizontalAxis {
-            label: "width between the gels, mm (closing to the right)".to_owned(),
-            left: widest,
-            right: narrowest,
-        },
-        top,
-        y_label: "D, % of the diagonal".to_owned(),
-        band: band(&envelope.window, objection),
-        levels: limit.map_or_else(Vec::new, limit_levels),
-        curve: rows.iter().map(squeezed).collect(),
-        diamonds: envelope.holds.iter().filter_map(carried).collect(),
-        marks: window_ends(&envelope.window),
-    }
-    .svg()
+        x: Axis::linear("width between the gels, mm (closing to the right)", widest, narrowest, 6),
+        y: Axis::linear("D, % of the diagonal", 0.0, top, 5).with_grid(),
+        marks,
+    };
+    LAYOUT.svg(&chart.title, std::slice::from_ref(&chart))
 }
 
-fn band(window: &SafeWindow, objection: Option<&'static str>) -> Option<AxisBand> {
+fn band(window: &SafeWindow, objection: Option<&'static str>) -> Option<Mark> {
     window.extent_mm()?;
-    Some(AxisBand { left: window.loose.width_mm?, right: window.tight.width_mm?, objection })
+    Some(Mark::Band { from: window.loose.width_mm?, to: window.tight.width_mm?, objection })
 }
 
-fn limit_levels(limit: DeformationLimit) -> Vec<LevelLine> {
-    let level = |d: f64, name: &str| LevelLine { y: d, label: format!("{name} {d:.2} %") };
+fn limit_levels(limit: DeformationLimit) -> Vec<Mark> {
+    let level = |d: f64, name: &str| Mark::Level { y: d, label: format!("{name} {d:.2} %") };
     vec![level(limit.tau_pct(), "τ"), level(limit.d_ref_pct, "D_ref")]
 }
 
 /// The two ends of the window with their widths and forces.
-fn window_ends(window: &SafeWindow) -> Vec<VerticalMark> {
+fn window_ends(window: &SafeWindow) -> Vec<Mark> {
     let end = |name: &str, WindowEnd { width_mm, force_n }: WindowEnd| {
         let (width, force) = width_mm.zip(force_n)?;
-        Some(VerticalMark { x: width, label: format!("{name}: {width:.1} mm, {force:.2} N") })
+        Some(Mark::Guide { x: width, label: format!("{name}: {width:.1} mm, {force:.2} N") })
     };
     let ends = [end("loose", window.loose), end("tight", window.tight)];
     ends.into_iter().flatten().collect()
@@ -124,7 +137,7 @@ mod tests {
         assert!(!plotted(&envelope).contains("cannot be carried"));
         envelope.carried_d_pct = Some(1.0 + envelope.limit(0.5).unwrap().tau_pct());
         let svg = plotted(&envelope);
-        assert!(svg.contains("cannot be carried below τ") && svg.contains("class=\"pressed\""), "{svg}");
+        assert!(svg.contains("cannot be carried below τ") && svg.contains("class=\"hatched\""), "{svg}");
         assert!(!svg.contains("class=\"band\""), "{svg}");
     }
 

@@ -4,7 +4,32 @@ use crate::{
     schema::{functions, record},
     vm::error::fail,
 };
-use softvt_media::chart::{Chart, ChartAxis, ChartLevel, MAX_SERIES, Series};
+use softvt_common::text::shortened;
+use softvt_media::{
+    axis::Axis,
+    chart::{Chart, ChartPoint, Curve, Layout, Margins, Mark},
+    drawing::{Shape, Stroke, Symbol, Tone},
+};
+
+/// The image, with room for the names of the series.
+const LAYOUT: Layout =
+    Layout { margins: Margins { right: 150.0, ..Layout::SINGLE.margins }, ..Layout::SINGLE };
+/// Letters of the name of a series, and of a title, that fit.
+const NAME_LETTERS: usize = 19;
+const TITLE_LETTERS: usize = 80;
+/// Number of intervals of a linear axis, at most.
+const TICKS: usize = 6;
+/// Symbols of the series, of which no more can be told apart.
+const SYMBOLS: [Symbol; 6] = [
+    Symbol::DOT,
+    Symbol::DIAMOND,
+    Symbol::RING,
+    Symbol::OPEN_DIAMOND,
+    Symbol { shape: Shape::Circle, radius: 2.0, ..Symbol::DIAMOND },
+    Symbol { shape: Shape::Diamond, ..Symbol::DOT },
+];
+/// Colours of the lines of the series in turn, each with dashes of its own.
+const TONES: [Tone; 3] = [Tone::Safe, Tone::Ink, Tone::Faint];
 
 record! {
     /// An axis of a plot.
@@ -48,10 +73,11 @@ functions! {
             /// Horizontal lines, such as limits.
             levels: Vec<LevelSpec> => Empty;
         } -> ["string"] {
-            if series.len() > MAX_SERIES {
+            if series.len() > SYMBOLS.len() {
                 let message = format!(
-                    "plot.series: {} series cannot be told apart; give at most {MAX_SERIES}, and further ones in another plot",
-                    series.len()
+                    "plot.series: {} series cannot be told apart; give at most {}, and further ones in another plot",
+                    series.len(),
+                    SYMBOLS.len()
                 );
                 return Err(fail(lua, message));
             }
@@ -75,21 +101,27 @@ functions! {
             if let Some(value) = all.copied().find(|value| value.abs() > LARGEST) {
                 return Err(fail(lua, format!("plot: {value:e} is too large to be drawn; leave it out")));
             }
-            let axis = |AxisSpec { label, log }| ChartAxis { label, is_logarithmic: log };
-            let one = |SeriesSpec { label, points, line }| Series {
-                label: label.unwrap_or_default(),
-                points,
-                has_line: line,
+            let axis = |axis: &AxisSpec, values: &mut dyn Iterator<Item = f64>| match axis.log {
+                true => Axis::decades(&axis.label, values),
+                false => Axis::around(&axis.label, values, TICKS),
             };
-            let level = |LevelSpec { y, label }| ChartLevel { y, label: label.unwrap_or_default() };
-            Chart {
-                title,
-                x: axis(x),
-                y: axis(y),
-                series: series.into_iter().map(one).collect(),
-                levels: levels.into_iter().map(level).collect(),
-            }
-            .svg()
+            let (x, y) = (
+                axis(&x, &mut values(0)),
+                axis(&y, &mut values(1).chain(levels.iter().map(|level| level.y))).with_grid(),
+            );
+            let curve = |(at, series): (usize, &SeriesSpec)| {
+                let point = |[x, y]: &[f64; 2]| ChartPoint { x: *x, y: *y, symbol: Some(SYMBOLS[at]) };
+                let stroke = Stroke::Curve { tone: TONES[at % TONES.len()], dash: at % TONES.len() };
+                Mark::Curve(Curve {
+                    name: shortened(series.label.as_deref().unwrap_or_default(), NAME_LETTERS),
+                    points: series.points.iter().map(point).collect(),
+                    stroke: series.line.then_some(stroke),
+                })
+            };
+            let curves: Vec<Mark> = series.iter().enumerate().map(curve).collect();
+            let level = |LevelSpec { y, label }| Mark::Level { y, label: label.unwrap_or_default() };
+            let marks = levels.into_iter().map(level).chain(curves).collect();
+            LAYOUT.svg(&title, &[Chart { title: shortened(&title, TITLE_LETTERS), x, y, marks }])
         }
     }
 }

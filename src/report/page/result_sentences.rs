@@ -10,7 +10,7 @@ use softvt_evaluation::category::EpisodeCategory;
 const FEW_EPISODES: usize = 30;
 
 /// One paragraph per suite, of the runs without a changed condition, and one per set of conditions.
-pub(super) fn headline(runs: &[RunSummary], effects: &[ConditionEffects]) -> Markup {
+pub(super) fn result_sentences(runs: &[RunSummary], effects: &[ConditionEffects]) -> Markup {
     let plain: Vec<&RunSummary> = runs.iter().filter(|run| run.run.condition().is_none()).collect();
     let suites = plain.chunk_by(|a, b| a.summary.suite == b.summary.suite).collect::<Vec<_>>();
     html! {

@@ -15,7 +15,7 @@ const HEIGHT: f64 = 34.0;
 const MIN_SPREAD: usize = 10;
 
 /// Peak D over τ of each episode, by run.
-pub(super) fn strips(runs: &[RunSummary]) -> Markup {
+pub(super) fn deformation_strips(runs: &[RunSummary]) -> Markup {
     let soft: Vec<&RunSummary> = runs.iter().filter(|run| run.is_soft()).collect();
     let occurs = |category| soft.iter().any(|run| run.summary.scores.count(category) > 0);
     let has_several = soft.iter().any(|run| run.summary.suite != soft[0].summary.suite);
