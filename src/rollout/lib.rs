@@ -104,8 +104,8 @@ pub use plausibility::{asset_warnings, friction_warnings, scene_warnings};
 pub use robot_instance::{ArmCommand, RobotInstance};
 pub use sensor_noise::SensorSeed;
 pub use sensors::{
-    BodyConfiguration, CAMERA_IMAGE_SUFFIXES, CloseUp, SensingError, Sensors, StateDeformation, StateRecording,
-    TACTILE_IMAGE_SUFFIXES, TACTILE_IMAGES, check_sensors, strain_colour,
+    BodyConfiguration, CAMERA_IMAGE_SUFFIXES, CloseUp, SensingError, Sensors, StateDeformation,
+    StateRecording, TACTILE_IMAGE_SUFFIXES, TACTILE_IMAGES, check_sensors, strain_colour,
 };
 pub use settled_box::SettledBox;
 pub use simulation::{ArticulatedPart, ObjectInstance, SettleError, Simulation, state_hash};

@@ -143,9 +143,10 @@ impl<'a> Episodes<'a> {
     fn rate(&self, test: fn(&EpisodeRecord) -> bool, group: MeasureGroup) -> Rate {
         let succeeds = |r: &&EpisodeRecord| r.outcome.is_valid() && test(r);
         let rate = Rate::from_test(self.records, succeeds);
-        let strata = self.tasks.filter(|_| group == MeasureGroup::Success).map(|tasks| {
-            tasks.values().map(|task| task.iter().map(succeeds).collect()).collect::<Vec<_>>()
-        });
+        let strata = self
+            .tasks
+            .filter(|_| group == MeasureGroup::Success)
+            .map(|tasks| tasks.values().map(|task| task.iter().map(succeeds).collect()).collect::<Vec<_>>());
         strata.map_or(rate, |strata| rate.with_bootstrap(&strata))
     }
 }
@@ -164,7 +165,8 @@ impl Pairs<'_> {
     }
 
     fn metrics(&self) -> BTreeMap<String, PairedDifference> {
-        let names: BTreeSet<&String> = self.pairs.iter().flat_map(|pair| pair.first.stats.metrics.keys()).collect();
+        let names: BTreeSet<&String> =
+            self.pairs.iter().flat_map(|pair| pair.first.stats.metrics.keys()).collect();
         let of = |name: &String| {
             let value = |r: &EpisodeRecord| r.metric(name).filter(|_| r.outcome.is_valid());
             let both = |[first, second]: [&EpisodeRecord; 2]| Some([value(first)?, value(second)?]);
@@ -198,7 +200,9 @@ impl Aggregate for Success {
     }
 
     fn difference(&self, pairs: &Pairs<'_>) -> PairedDifference {
-        PairedDifference::from_successes(pairs.records().map(|pair| pair.map(|r| r.outcome.is_valid() && (self.0)(r))))
+        PairedDifference::from_successes(
+            pairs.records().map(|pair| pair.map(|r| r.outcome.is_valid() && (self.0)(r))),
+        )
     }
 }
 
@@ -212,7 +216,11 @@ impl Aggregate for SafeSuccess {
 
     fn score(&self, episodes: &Episodes<'_>, group: MeasureGroup) -> Rate {
         let is_all_soft = episodes.records.iter().all(|r| r.has_soft_target());
-        if is_all_soft && !episodes.is_any_judged() { Rate::not_judged() } else { episodes.rate(self.0, group) }
+        if is_all_soft && !episodes.is_any_judged() {
+            Rate::not_judged()
+        } else {
+            episodes.rate(self.0, group)
+        }
     }
 
     fn difference(&self, pairs: &Pairs<'_>) -> PairedDifference {
@@ -236,7 +244,9 @@ impl Aggregate for SoftSuccess {
     }
 
     fn difference(&self, pairs: &Pairs<'_>) -> PairedDifference {
-        PairedDifference::from_successes(pairs.judged().map(|pair| pair.map(|r| r.outcome.is_valid() && (self.0)(r))))
+        PairedDifference::from_successes(
+            pairs.judged().map(|pair| pair.map(|r| r.outcome.is_valid() && (self.0)(r))),
+        )
     }
 }
 
@@ -506,7 +516,8 @@ mod tests {
 
     /// The table of the measures in `docs/results.md`.
     fn page() -> String {
-        let key = |name: Option<&str>, path: &str| name.map_or_else(String::new, |name| format!("`{path}{name}`"));
+        let key =
+            |name: Option<&str>, path: &str| name.map_or_else(String::new, |name| format!("`{path}{name}`"));
         let row = |measure: &Measure| {
             let Measure { summary, within, paired, unit, about, .. } = measure;
             let summary = key(*summary, "") + &key(*within, "within_episodes.");
@@ -538,7 +549,10 @@ mod tests {
         let paired = serde_json::to_value(PairedComparison::from_pairs(&[])).unwrap();
         for measure in MEASURES {
             assert!(measure.summary.is_none_or(|key| scores.get(key).is_some()), "{measure:?}");
-            assert!(measure.within.is_none_or(|key| scores["within_episodes"].get(key).is_some()), "{measure:?}");
+            assert!(
+                measure.within.is_none_or(|key| scores["within_episodes"].get(key).is_some()),
+                "{measure:?}"
+            );
             assert!(measure.paired.is_none_or(|key| paired.get(key).is_some()), "{measure:?}");
             assert!(measure.paired.is_none() || measure.label().chars().count() <= 18, "{measure:?}");
         }

@@ -259,13 +259,8 @@ pub fn is_record_key(name: &str) -> bool {
         part[name] = json!([[[]]]);
         serde_json::from_value::<T>(part).is_err()
     }
-    let id = EpisodeId {
-        suite: String::new(),
-        task: 0,
-        episode: 0,
-        base_seed: 0,
-        split: EpisodeSplit::default(),
-    };
+    let id =
+        EpisodeId { suite: String::new(), task: 0, episode: 0, base_seed: 0, split: EpisodeSplit::default() };
     let header = EpisodeHeader {
         id,
         prompt: String::new(),
@@ -528,7 +523,8 @@ pub(crate) mod tests {
     #[test]
     fn every_key_of_a_record_and_no_other_is_one() {
         let written = serde_json::to_value(sample()).unwrap();
-        let absent = ["task_prompt", "targets", "goal_parts", "others", "gave_up", "variation", "clamped_steps"];
+        let absent =
+            ["task_prompt", "targets", "goal_parts", "others", "gave_up", "variation", "clamped_steps"];
         for key in written.as_object().unwrap().keys().map(String::as_str).chain(absent) {
             assert!(is_record_key(key), "{key}");
         }

@@ -159,8 +159,7 @@ impl TaskFile {
             Ok(environment) if environment["env_name"] == "softvt" => error,
             _ => DatasetError::not_recorded_by_softvt(&self.path, format!("/data/demo_{demo}")),
         })?;
-        serde_json::from_str(&text)
-            .map_err(|error| DatasetError::content(&self.path, key, error.to_string()))
+        serde_json::from_str(&text).map_err(|error| DatasetError::content(&self.path, key, error.to_string()))
     }
 
     /// Number of control steps of a demonstration.

@@ -14,9 +14,7 @@ use super::{
     record::{EpisodeRecord, UnreachableCommand},
 };
 use softvt_common::{episode_id::EpisodeIndex, text::counted};
-use softvt_evaluation::{
-    category::EpisodeCategory, statistics::Rate, verdict::Outcome,
-};
+use softvt_evaluation::{category::EpisodeCategory, statistics::Rate, verdict::Outcome};
 
 /// Number of intervals of the κ curve between 0 and 1.
 const KAPPA_STEPS: u32 = 20;
@@ -33,7 +31,8 @@ pub struct TauRange {
 impl TauRange {
     /// Those of the soft targets; `None` without any.
     pub(crate) fn new<'a>(records: impl Iterator<Item = &'a EpisodeRecord>) -> Option<Self> {
-        let taus: Vec<f64> = records.flat_map(EpisodeRecord::soft_targets).filter_map(|target| target.tau).collect();
+        let taus: Vec<f64> =
+            records.flat_map(EpisodeRecord::soft_targets).filter_map(|target| target.tau).collect();
         let [min, max] = [f64::min, f64::max].map(|of| taus.iter().copied().reduce(of));
         min.zip(max).map(|(min, max)| Self { min, max })
     }
