@@ -1,10 +1,6 @@
 //! Run of an experiment: its points on threads, its rows in the order of the points, its files at the end.
 
-use std::{
-    collections::{BTreeMap, BTreeSet},
-    path::{Path, PathBuf},
-    sync::Arc,
-};
+use std::{collections::BTreeSet, path::PathBuf, sync::Arc};
 
 use serde_json::Value;
 
@@ -22,7 +18,6 @@ use softvt_common::{
 use softvt_runs::{
     experiment_folder::{ExperimentFolder, ExperimentRow, FinishedPoint, RESERVED},
     manifest::{ExperimentManifest, VERSION, working_folder},
-    run_folder::RunFolder,
 };
 use softvt_script::{Experiment, ExperimentInput, ExperimentInputError, LoadedScript, OptionSpec};
 

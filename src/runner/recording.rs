@@ -185,7 +185,7 @@ impl<'a> SuiteRecording<'a> {
             let due = |task: &'a Task| {
                 self.due(&log.records, task.id).into_iter().map(move |episode| EpisodeJob { task, episode })
             };
-            let jobs = EpisodeList::listed(self.tasks.iter().flat_map(|task| due(task)).collect());
+            let jobs = EpisodeList::listed(self.tasks.iter().flat_map(|task| due(task)));
             if !jobs.is_empty() {
                 let record =
                     |job| Ok(SimulatedEpisode { finished: self.record_attempt(job)?, rendered: Ok(()) });

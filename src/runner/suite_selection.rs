@@ -85,7 +85,7 @@ pub fn select_episodes<'a>(config: &RunConfig, suite: &Suite, tasks: &[&'a Task]
     let jobs = |task: &&'a Task| {
         selected.iter().map(move |episode| EpisodeJob { task, episode: *episode }).collect::<Vec<_>>()
     };
-    EpisodeList::listed(tasks.iter().flat_map(jobs).collect())
+    EpisodeList::listed(tasks.iter().flat_map(jobs))
 }
 
 /// Checks that every suite gets an output folder of its own.
