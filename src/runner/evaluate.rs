@@ -77,10 +77,11 @@ impl<'a> RunLog<'a> {
     /// # Errors
     /// The folder is of another run or anything else, or cannot be written.
     pub(crate) fn open(run: &'a PreparedRun, manifest: &RunManifest, resume: bool) -> Result<Self, RunError> {
-        let (folder, records) = match resume {
-            true => RunFolder::resume(&run.out, manifest)?,
-            false => (RunFolder::create(&run.out, manifest)?, Vec::new()),
+        let opened = match resume {
+            true => RunFolder::resume(&run.out, manifest),
+            false => RunFolder::create(&run.out, manifest).map(|folder| (folder, Vec::new())),
         };
+        let (folder, records) = opened.map_err(|error| run.config.error(error))?;
         let attempts = match run.config.policy.is_outside() {
             true => Some(Arc::new(Attempts::open(folder.path())?)),
             false => None,

@@ -78,7 +78,7 @@ pub fn run<E: From<RunError>>(
     let open = || Experiment::open_with(loaded, &input).map_err(RunError::from);
     let manifest = manifest(config, loaded, name, points);
     let opened = out.map(|dir| ExperimentFolder::open(dir, &manifest, config.resume)).transpose();
-    let (mut folder, finished) = opened.map_err(RunError::from)?.unzip();
+    let (mut folder, finished) = opened.map_err(|error| config.error(error))?.unzip();
     let mut finished = finished.unwrap_or_default();
     let left: Vec<usize> = (0..points).filter(|point| !finished.contains_key(point)).collect();
     let run_point = |job: usize| {
