@@ -131,7 +131,10 @@ impl FromArgMatches for ScriptOptions {
             let value = matches.get_one::<String>(id).filter(|_| is_given)?;
             Some(format!("{flag}={value}"))
         });
-        Ok(Self { words: given.collect() })
+        let mut words: Vec<String> = given.collect();
+        // As they are declared, by name: results have them in one order, whatever that of the command line.
+        words.sort_by_key(|word| word.split('=').next().map(|flag| flag.replace('-', "_")));
+        Ok(Self { words })
     }
 
     fn update_from_arg_matches(&mut self, matches: &ArgMatches) -> Result<(), clap::Error> {
@@ -247,6 +250,13 @@ mod tests {
             let parsed = format!("{command:?}");
             assert!(parsed.contains(r#"ScriptOptions { words: ["--gap-mm=3"] }"#), "{words}: {parsed}");
         }
+    }
+
+    #[test]
+    fn options_of_a_script_have_the_order_of_their_names() {
+        let command = with_option("a = { default = 1 }, b", "x.lua --b 2 --a=3").expect("valid");
+        let parsed = format!("{:?}", command.expect("a command"));
+        assert!(parsed.contains(r#"ScriptOptions { words: ["--a=3", "--b=2"] }"#), "{parsed}");
     }
 
     #[test]
