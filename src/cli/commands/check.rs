@@ -36,7 +36,9 @@ pub(crate) struct CheckArgs {
 /// The first thing that is not valid.
 pub(super) fn run(args: CheckArgs) -> Result<(), CliError> {
     let config = RunConfig { episodes: args.episodes, ..args.script.config()? };
-    let run = args.policy.checked(config.load()?)?;
+    let ConfiguredScript { config, script } = args.policy.checked(config.load()?)?;
+    // Limits are looked up for all episodes.
+    let run = ConfiguredScript { config: RunConfig { episodes: None, ..config }, script };
     let ConfiguredScript { config, script: loaded } = &run;
     let plan = &loaded.plan;
     check_distinct_out_dirs(config, plan.suites())?;
