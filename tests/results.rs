@@ -11,10 +11,6 @@ use std::{fs, path::Path};
 
 use rows::{Rate, Row};
 use serde_json::{Value, json};
-use softvt::{
-    evaluation::statistics,
-    runs::summary::{SuiteSummary, TaskScores},
-};
 
 /// Root of the repository.
 const ROOT: &str = env!("CARGO_MANIFEST_DIR");
@@ -69,23 +65,22 @@ fn the_first_screen_shows_the_best_constant_number() {
 /// Writes a run of `suite` with two episodes, of which one is safe.
 fn write_run(folder: &Path, script: &str, suite: &str, policy: &str) {
     fs::create_dir_all(folder).expect("a folder");
-    let mut summary = SuiteSummary::from_records(suite, policy, &[]);
-    summary.scores.episodes = 2;
-    summary.scores.goal_success_rate = statistics::Rate::new(2, 2);
-    summary.scores.safety_success_rate = statistics::Rate::new(1, 2);
-    let (prompt, asset, scores) = (String::new(), String::new(), summary.scores.clone());
-    summary.by_task.push(TaskScores { task: 0, prompt, asset, scores });
     let mut manifest: Value = serde_json::from_str(include_str!("data/run.json")).expect("a manifest");
-    (manifest["script"], manifest["suite"]) = (script.into(), suite.into());
-    let record = |(d, time, grip): (f64, f64, f64)| {
-        json!({ "d_peak": d, "tau": 0.2, "goal_time_s": time, "grip_ratio": grip }).to_string() + "\n"
+    (manifest["script"], manifest["suite"], manifest["policy"]) =
+        (script.into(), suite.into(), policy.into());
+    let record = |(episode, d, time, grip): (u32, f64, f64, f64)| {
+        let mut record: Value =
+            serde_json::from_str(include_str!("data/episode_record.json")).expect("a record");
+        (record["suite"], record["episode"], record["safety"]) =
+            (suite.into(), episode.into(), (d < 0.2).into());
+        (record["d_peak"], record["tau"]) = (d.into(), 0.2.into());
+        (record["goal_time_s"], record["grip_ratio"]) = (time.into(), grip.into());
+        format!("{record}\n")
     };
-    let files = [
-        ("run.json", manifest.to_string()),
-        ("summary.json", serde_json::to_string(&summary).expect("JSON")),
-        ("episodes.jsonl", [(0.1, 4.0, 1.5), (0.4, 6.0, 2.5)].map(record).concat()),
-    ];
-    for (name, text) in files {
+    let episodes = [(0, 0.1, 4.0, 1.5), (1, 0.4, 6.0, 2.5)].map(record).concat();
+    for (name, text) in
+        [("run.json", manifest.to_string()), ("summary.json", "{}".to_owned()), ("episodes.jsonl", episodes)]
+    {
         fs::write(folder.join(name), text).expect("a file");
     }
 }
@@ -119,7 +114,7 @@ fn rows_follow_the_runs_and_replace_earlier_ones() {
     assert_eq!(names, [a, c, b, d, ("one", "expert"), ("one", "binary")]);
     // Medians of D/τ 0.5 and 2, of grip ratios 1.5 and 2.5, and of times 4 and 6 s.
     let page = tables::page(&table, &[("size-seen".to_owned(), "sees the size".to_owned())].into(), "abcd");
-    let cells = "| 2 | 0 | 100.0\u{a0}[34.2,\u{a0}100.0] | – | 50.0\u{a0}[9.5,\u{a0}90.5] | 1.25 | 2.00 | 5.0 | `abc` |";
+    let cells = "| 2 | 0 | 100.0\u{a0}[34.2,\u{a0}100.0] | 100.0\u{a0}[34.2,\u{a0}100.0] | 50.0\u{a0}[9.5,\u{a0}90.5] | 1.25 | 2.00 | 5.0 | `abc` |";
     assert!(page.contains(&format!("| `size-seen`: sees the size {cells}")), "{page}");
     assert!(page.contains("## `softvt suites/controllers.lua --episodes 2`\n\n### One-Varied\n"), "{page}");
     assert!(page.contains("## `softvt suites/all.lua --episodes 2 --policy NAME`\n"), "{page}");
