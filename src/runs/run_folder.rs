@@ -67,7 +67,7 @@ pub enum RunFolderError {
     #[error("{path}:{line}: {episode} occurs twice (first in line {first}): remove one of the lines")]
     DuplicateEpisode { path: String, line: usize, first: usize, episode: EpisodeIndex },
     #[error(
-        "{path}:{line}: {episode} is not of the run that {RUN} describes; one of the two files is of another run"
+        "{path}:{line}: {episode} is not of the run that {RUN} describes; one of the two files was changed, or is of another run"
     )]
     ForeignEpisode { path: String, line: usize, episode: EpisodeIndex },
 }
