@@ -113,7 +113,8 @@ const FAR: f64 = 3.0;
 
 /// A length in mm with one decimal.
 pub(super) fn tenths_of_mm(metres: f64) -> String {
-    format_number((1e4 * metres).round() / 10.0)
+    // 0 has no sign.
+    format_number((1e4 * metres).round() / 10.0 + 0.0)
 }
 
 fn overlap_remedy(first: &str, below_origin: Option<f64>) -> String {

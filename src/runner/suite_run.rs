@@ -506,7 +506,7 @@ impl<'a> SuiteRun<'a> {
     /// Warnings about friction that the episode sets without effect.
     pub(crate) fn friction_warnings(&self, opened: &EpisodeSetup) -> Vec<String> {
         let variation = self.suite.vary.as_ref().zip(opened.variation.as_ref());
-        friction_warnings(&opened.scene, variation, self.settings.robot.pads.static_mu)
+        friction_warnings(&opened.scene, &opened.nominal, variation, self.settings.robot.pads.static_mu)
     }
 
     /// Refuses shifts that change neither the scene nor the prompt of any task, unless their values are the nominal

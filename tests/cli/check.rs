@@ -23,7 +23,7 @@ fn standard_suites_are_valid() {
 fn warnings_are_printed_and_errors_refused() {
     let light = Small { material: "youngs_pa = 40, poisson = 0.3, density = 0.3", ..Small::default() };
     let output = light.project().succeeds("check x.lua");
-    assert!(output.err.contains("softvt: warning: asset cube: youngs_pa is 40 Pa"), "{}", output.err);
+    assert!(output.err.contains("softvt: warning: x.lua:3: asset.body.youngs_pa: 40 Pa"), "{}", output.err);
     // Its post is out of reach.
     let of_post = Small::default().project().succeeds("check x.lua").err;
     assert!(

@@ -75,7 +75,7 @@ fn a_limit_that_rounds_to_nothing_is_no_result() {
     let run = quick(&project, "run");
     let message = run.experiment().1.expect_err("no limit");
     assert!(
-        message.contains("brick: τ is ") && message.contains("stiffer than rubber; give it in Pa"),
+        message.contains("brick: τ is ") && message.contains("outside of the usual range 300..10000000 Pa"),
         "{message}"
     );
     assert!(!project.path("run/assets/calibration/brick.json").exists());

@@ -29,7 +29,7 @@ fn errors_of_a_run_are_found_by_the_check() {
     assert_snapshot!(check("object = \"cube\"", "object = \"floor\""), @r#"x.lua:10: task.goal.object: "floor" never moves; name an object whose body is softvt.soft or softvt.rigid"#);
     assert_snapshot!(check("object = \"cube\"", "object = \"cub\""), @r#"x.lua:10: task.goal.object: unknown object "cub"; did you mean "cube"?"#);
     assert_snapshot!(check("(scene)\n", "(scene) scene.start_q[4] = 0\n"), @"x.lua:4: scene.start_q[4]: expected radians in -3.0718..-0.0698, the limits of panda_link4, got 0");
-    assert_snapshot!(check("tasks = {", "tasks = {}, shifts = {"), @r#"x.lua:9: suite.shifts[1]: expected the result of softvt.shift{…}, got a table"#);
+    assert_snapshot!(check("tasks = {", "shifts = { {} }, tasks = {"), @r#"x.lua:9: suite.shifts[1]: expected the result of softvt.shift{…}, got a table"#);
 }
 
 #[test]
@@ -417,7 +417,7 @@ fn friction_that_loosens_no_grip_is_told_with_what_set_it() {
     let reason = "a pair of surfaces takes the larger coefficient, which is at least";
     let run =
         |change: &str, value: f64| project.run("x.lua").policy("noop").shift(change, value).finish().messages;
-    let told = format!("warning: object cube: its static_mu is 0.012, and {reason} 0.6 on pads and tables; ");
+    let told = format!("warning: object cube: its static_mu is 0.012, and {reason} 1.5 on pads; ");
     assert!(run("friction", 0.02).contains(&told), "{}", run("friction", 0.02));
     assert!(!run("friction", 3.0).contains(reason) && !run("mass", 2.0).contains(reason));
     let varied = |range: &str| {

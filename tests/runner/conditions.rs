@@ -92,7 +92,7 @@ fn invalid_conditions_are_reported_before_anything_runs() {
             "suites/trial.lua:1: condition \"a\": set: no setting \"robot.gripper.efort\"",
         ),
         ("{ name = \"a\", shift = { mass = -1 } }", "shift mass: expected a number in 0.01..100"),
-        ("{ name = \"a\" },\n{ name = \"a\" }", "is the name of another condition; give another"),
+        ("{ name = \"a\" },\n{ name = \"a\" }", "conditions[2]: \"a\" is there already; give each once"),
         ("{ name = \"reference\" }", "\"reference\" is the name of the run without changes; give another"),
         (
             "{ name = \"a b\", shift = { mass = 2 } },\n{ name = \"a_b\", shift = { mass = 3 } }",

@@ -53,7 +53,7 @@ pub fn scene_warnings(task: &Task, scene: &Scene, judges_soft: bool, cache: &Ass
     let (least_s, budget_s) = (least_time(&task.goal), f64::from(task.budget_steps) * CONTROL_DT);
     let late = (least_s > budget_s).then(|| {
         let [least_s, budget_s] = [least_s, budget_s].map(format_number);
-        format!("task {}: the goal must hold for {least_s} s, and the budget is {budget_s} s", task.id)
+        format!("task {}: the goal must hold for {least_s} s, and the budget is {budget_s} s: no episode can reach it", task.id)
     });
     let has_soft = moved.iter().any(|object| matches!(object.asset.body, Body::Soft(_)));
     let unjudged = (judges_soft && !has_soft).then(|| {
@@ -240,9 +240,11 @@ const ROUNDING: f64 = 1e-9;
 
 /// Warnings about free objects whose static friction acts in no contact, since a pair of surfaces takes the larger coefficient
 /// and all that holds or carries them has a larger one: `pads_mu` and those of fixed objects. Of a drawn friction, the
-/// largest that can be drawn counts.
+/// largest that can be drawn counts. Of one that is lower than in the `nominal` scene, the pads alone count, since grips
+/// are no looser than without the change.
 pub fn friction_warnings(
     scene: &Scene,
+    nominal: &Scene,
     variation: Option<(&VariationRanges, &SceneVariation)>,
     pads_mu: f64,
 ) -> Vec<String> {
@@ -256,13 +258,17 @@ pub fn friction_warnings(
         });
         let mu = friction.static_mu * drawn.unwrap_or(1.0);
         let is_free = matches!(object.asset.body, Body::Soft(_) | Body::Rigid { .. });
-        (is_free && !friction.coated && mu < others_mu - ROUNDING).then(|| {
+        let was = nominal.objects.iter().find(|other| other.name == object.name);
+        let was = was.map_or(mu, |was| was.asset.friction.static_mu);
+        let is_lowered = friction.static_mu < was - ROUNDING && was <= pads_mu + ROUNDING;
+        let (least, surfaces) = if is_lowered { (pads_mu, "pads") } else { (others_mu, "pads and tables") };
+        (is_free && !friction.coated && mu < least - ROUNDING).then(|| {
             format!(
                 "object {}: its static_mu is {}, and a pair of surfaces takes the larger coefficient, which is at least {} on \
-                 pads and tables; that of a coating (coated = true) counts in every pair",
+                 {surfaces}; that of a coating (coated = true) counts in every pair",
                 object.name,
                 significant(mu, 3),
-                significant(others_mu, 3)
+                significant(least, 3)
             )
         })
     };
