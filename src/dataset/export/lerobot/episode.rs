@@ -54,6 +54,10 @@ impl<'a> EpisodeData<'a> {
     ) -> Result<Self, DatasetError> {
         let steps = demo.entry.num_samples;
         let reader = DemoReader::open(demo)?;
+        // Numbers first: what is wrong with them is known before the images are decompressed.
+        let stored = features.iter().filter_map(|feature| Some((feature, version.key(feature)?)));
+        let numbers =
+            stored.clone().map(|(feature, _)| reader.numbers(job, feature)).collect::<Result<Vec<_>, _>>()?;
         let mut images = [(); 3].map(|()| Some(ImageColumn::new()));
         reader.for_each_step(job, |step, step_images| {
             let mut columns = images.iter_mut().flatten().zip(&step_images);
@@ -67,8 +71,7 @@ impl<'a> EpisodeData<'a> {
             [counted(0), constant(index), counted(demo.first_frame), constant(demo.prompt)];
 
         let mut episode = Self { index, demo, columns: Vec::new(), statistics: Vec::new() };
-        for feature in features {
-            let Some(key) = version.key(feature) else { continue };
+        for ((feature, key), numbers) in stored.zip(numbers) {
             match feature.content {
                 Content::Image(index) => {
                     let Some(ImageColumn { images, counts }) = images[index].take() else { continue };
@@ -76,15 +79,14 @@ impl<'a> EpisodeData<'a> {
                     episode.push(key, &[3, 1, 1], parts, ColumnValues::Images(images));
                 }
                 Content::Markers => {
-                    let markers = reader.numbers(job, feature)?;
                     let (shape, parts) = match version {
-                        LeRobotVersion::V21 => (&MARKER_SHAPE[..], statistics_per_marker(&markers)),
-                        LeRobotVersion::V30 => (&[2][..], statistics_of_all_markers(&markers)),
+                        LeRobotVersion::V21 => (&MARKER_SHAPE[..], statistics_per_marker(&numbers)),
+                        LeRobotVersion::V30 => (&[2][..], statistics_of_all_markers(&numbers)),
                     };
-                    episode.push(key, shape, parts, ColumnValues::F32(markers));
+                    episode.push(key, shape, parts, ColumnValues::F32(numbers));
                 }
                 Content::Vector | Content::Action => {
-                    episode.push_vectors(key, feature.shape[0], reader.numbers(job, feature)?);
+                    episode.push_vectors(key, feature.shape[0], numbers);
                 }
             }
         }

@@ -24,27 +24,27 @@ const MAX_RECORD: usize = i32::MAX as usize;
 /// A stream is missing, of unexpected shape or not finite; the record is too large; or the export was cancelled.
 pub(super) fn read(job: &ExportJob<'_>, demo: &SelectedDemo) -> Result<Vec<u8>, DatasetError> {
     let reader = DemoReader::open(demo)?;
-    let mut images = [(); 3].map(|()| Vec::new());
+    let (images, vectors): (Vec<_>, Vec<_>) =
+        features::all(job).into_iter().partition(|feature| matches!(feature.content, Content::Image(_)));
+    let mut observed = Vec::new();
+    for feature in vectors {
+        let numbers = Feature::floats(reader.numbers(job, &feature)?);
+        observed.push(match feature.content {
+            Content::Action => ("steps/action".to_owned(), numbers),
+            _ => (format!("steps/observation/{}", feature.name), numbers),
+        });
+    }
+    let mut files = [(); 3].map(|()| Vec::new());
     reader.for_each_step(job, |_, step_images| {
-        for (files, image) in images.iter_mut().zip(&step_images) {
+        for (files, image) in files.iter_mut().zip(&step_images) {
             files.push(encode_png(image)?);
         }
         Ok(())
     })?;
-    let mut observed = Vec::new();
-    for feature in features::all(job) {
-        observed.push(match feature.content {
-            Content::Image(index) => (
-                format!("steps/observation/{}", feature.name),
-                Feature::bytes(std::mem::take(&mut images[index])),
-            ),
-            Content::Action => ("steps/action".to_owned(), Feature::floats(reader.numbers(job, &feature)?)),
-            Content::Vector | Content::Markers => (
-                format!("steps/observation/{}", feature.name),
-                Feature::floats(reader.numbers(job, &feature)?),
-            ),
-        });
-    }
+    let files = images.iter().zip(files);
+    observed.extend(
+        files.map(|(image, files)| (format!("steps/observation/{}", image.name), Feature::bytes(files))),
+    );
     let entry = &demo.entry;
     let steps = entry.num_samples;
     let is_last = |step: usize| step + 1 == steps;
