@@ -11,94 +11,17 @@ fn has(value: &Value, keys: &[&str]) {
 }
 
 #[test]
-fn a_file_that_cannot_be_written_is_refused_before_the_work() {
-    let project = Project::new(&[("file", "")]);
-    for flag in ["--out", "--growth"] {
-        let refused = project.refusal(&format!("bench {flag} file/x.svg"));
-        assert!(refused.starts_with("cannot write file/x.svg: "), "{refused}");
-    }
-    assert!(!project.path("file.part").exists());
-}
-
-#[test]
-fn lists_are_printed_as_text_and_as_json() {
+fn lists_have_a_line_for_each_row_of_their_json() {
     let project = Project::new(&[]);
-    let json = |what: &str| -> Vec<Value> {
-        serde_json::from_str(&project.succeeds(&format!("list {what} --json")).out).expect("JSON")
-    };
-    let suites = json("suites");
-    assert!(suites.iter().any(|s| s["name"] == "spatial_soft" && s["tasks"] == 10 && s["episodes"] == 5));
-    let needs = |name: &str| suites.iter().find(|s| s["name"] == name).map(|s| s["needs"].clone());
-    assert_eq!(needs("object_soft"), Some("nothing".into()));
-    assert_eq!(needs("spatial_varied"), Some("size".into()));
-    assert!(suites.iter().any(|s| s["name"] == "all" && s["tasks"] == 60 && s["file"] == "suites/all.lua"));
-    let tasks = json("tasks");
-    assert_eq!(
-        tasks.len(),
-        110,
-        "those of four suites, two varied ones, two hidden ones, two twins and Household; none is listed twice"
-    );
-    let of_suite: Vec<_> = tasks.iter().filter(|t| t["suite"] == "spatial_soft").collect();
-    assert_eq!(of_suite.len(), 10);
-    assert!(of_suite[1]["prompt"].as_str().is_some_and(|p| p.starts_with("pick up the left white spiral")));
-    assert!(json("assets").iter().filter(|a| a["name"] == "plate" || a["name"] == "sesame_bun").count() == 2);
-    let names = |what: &str| json(what).iter().map(|row| row["name"].clone()).collect::<Vec<_>>();
-    assert_eq!(
-        names("policies")[..13],
-        [
-            "expert",
-            "expert-binary",
-            "tactile-servo",
-            "fixed-closure",
-            "size-seen",
-            "contact-depth",
-            "one-force",
-            "one-force-for-all",
-            "drives",
-            "look-retry",
-            "weigh",
-            "noop",
-            "random"
-        ]
-    );
-    assert!(names("policies").contains(&"scripts/policies/hold.lua".into()));
-    assert_eq!(
-        names("profiles")[..9],
-        [
-            "vision",
-            "vision_drives",
-            "visuo_tactile",
-            "vision_joints",
-            "visuo_tactile_joints",
-            "softvtbench",
-            "softvtbench_v02",
-            "softvtbench_v02_latched",
-            "libero"
-        ]
-    );
-    assert!(names("profiles").contains(&"scripts/profiles/libero.lua".into()));
-    for what in ["suites", "tasks", "assets", "policies", "profiles"] {
-        assert_eq!(
-            project.succeeds(&format!("list {what}")).out.lines().count(),
-            json(what).len() + 1,
-            "a heading and one line each"
-        );
+    for (what, expected) in
+        [("suites", "spatial_soft"), ("assets", "plate"), ("policies", "noop"), ("profiles", "libero")]
+    {
+        let rows: Vec<Value> =
+            serde_json::from_str(&project.succeeds(&format!("list {what} --json")).out).expect("JSON");
+        let lines = project.succeeds(&format!("list {what}")).out.lines().count();
+        assert_eq!(lines, rows.len() + 1, "a heading and one line each");
+        assert!(rows.iter().any(|row| row["name"] == expected), "{expected}");
     }
-    project.write("suites/broken.lua", b"return nothing.at_all");
-    for what in ["suites", "tasks"] {
-        let listed = project.softvt(&format!("list {what}"));
-        assert_eq!(listed.code, 2, "{}", listed.err);
-        assert!(
-            listed.err.contains("suites/broken.lua:1:") && listed.out.contains("spatial_soft"),
-            "{}",
-            listed.err
-        );
-    }
-    assert!(
-        project
-            .refusal("list robots")
-            .contains("[possible values: suites, tasks, assets, policies, profiles, settings]")
-    );
 }
 
 #[test]
@@ -111,6 +34,17 @@ fn texts_of_any_length_are_cut_off_in_tables() {
         let table = project.succeeds(command).out;
         assert!(table.contains('…') && table.lines().all(|line| line.chars().count() < 1000), "{command}");
     }
+}
+
+#[test]
+fn control_characters_of_scripts_are_escaped() {
+    let text = Small { expert: "arm:give_up('wait\\27[2Jfor it')", ..Small::default() }.text();
+    let project = Project::new(&[("x.lua", &format!("print('\\27]0;mine\\7')\n{text}"))]);
+    let output = project.succeeds("x.lua --out run");
+    assert!(output.out.contains("wait\\u{1b}[2Jfor it") && !output.out.contains('\u{1b}'), "{}", output.out);
+    assert!(output.err.contains("\\u{1b}]0;mine\\u{7}") && !output.err.contains('\u{1b}'), "{}", output.err);
+    project.write("x.lua", b"error('\\27[31mred')");
+    assert!(project.refusal("x.lua").contains("\\u{1b}[31mred"));
 }
 
 #[cfg(unix)]
@@ -142,8 +76,6 @@ fn init_keeps_an_existing_settings_file() {
     assert!(again.contains("kept new/folder/.luarc.json"), "{again}");
     assert_eq!(project.text("new/folder/.luarc.json"), "{\"mine\":1}");
     assert!(project.text("new/folder/library/softvt.d.lua").starts_with("---@meta softvt"));
-    project.write("file", b"");
-    assert!(project.refusal("init file").starts_with("cannot create the folder file/library"));
 }
 
 #[test]
@@ -214,20 +146,13 @@ fn a_trace_has_one_line_per_control_step() {
 }
 
 #[test]
-fn unsuitable_output_folders_are_refused() {
+fn a_run_in_the_folder_of_another_is_refused() {
     let project = Small::default().project();
-    project.write("file", b"mine");
-    assert!(project.refusal("x.lua --out file").starts_with("x.lua: cannot create the folder file: "));
-    assert!(
-        project.refusal("x.lua --out file/run").starts_with("x.lua: cannot create the folder file/run: ")
-    );
-    assert_eq!(project.text("file"), "mine");
     project.succeeds("x.lua --out run");
     let before = (project.text("run/run.json"), project.text("run/episodes.jsonl"));
-    assert_eq!(
-        project.refusal("x.lua --out run --policy noop"),
-        "x.lua: run already holds a run (run.json): resume it, or give another output folder"
-    );
+    let refused = project.refusal("x.lua --out run --policy noop");
+    let expected = "run already holds a run (run.json): resume it, or give another output folder";
+    assert!(refused.ends_with(expected), "{refused}");
     assert_eq!((project.text("run/run.json"), project.text("run/episodes.jsonl")), before);
 }
 
@@ -260,17 +185,12 @@ fn run_files_record_sources_and_thresholds() {
 #[test]
 fn several_suites_are_one_json_document() {
     let one = Small { task: "budget_steps = 1", ..Small::default() }.text();
-    let two = |name: &str| {
-        let other = one.replace("name = \"one\", object_type", &format!("name = \"{name}\", object_type"));
-        let body = |text: &str| format!("(function()\n{text}\nend)()");
-        Project::new(&[("x.lua", &format!("return {{ {}, {} }}\n", body(&one), body(&other)))])
-    };
-    let project = two("other");
+    let other = one.replace("name = \"one\", object_type", "name = \"other\", object_type");
+    let list = "return { (require \"one\"), (require \"other\") }";
+    let project = Project::new(&[("x.lua", list), ("one.lua", &one), ("other.lua", &other)]);
     let output = project.succeeds("x.lua --policy noop --json --out run");
     let document: Value = serde_json::from_str(&output.out).expect("one document");
     assert_eq!((&document[0]["suite"], &document[1]["suite"]), (&"one".into(), &"other".into()));
-    let message = two("one").refusal("x.lua --policy noop --out run");
-    assert_eq!(message, "x.lua:25: two suites are named \"one\"; rename one");
 }
 
 #[cfg(unix)]
@@ -315,4 +235,13 @@ fn doctor_fails_on_another_golden_state() {
 fn the_golden_episode_matches_the_published_one() {
     let output = Project::new(&[]).succeeds("doctor");
     assert!(output.out.contains("matches"), "{}", output.out);
+}
+
+#[test]
+#[ignore = "nightly: every scene of the standard suites settles"]
+fn standard_suites_are_valid() {
+    for words in ["check suites/all.lua", "check suites/household.lua --rigid-twin"] {
+        let output = Project::new(&[]).succeeds(words);
+        assert!(!output.err.contains("warning"), "{}", output.err);
+    }
 }

@@ -50,50 +50,6 @@ fn the_grip_code_of_a_run_is_printed() {
         let printed = output.err.lines().find_map(|line| line.strip_prefix("softvt: gripper: "));
         assert_eq!(printed, code, "{words}: {}", output.err);
     }
-    let message = project.refusal("x.lua --out other --policy ws://127.0.0.1:9 --gripper wide");
-    assert!(message.contains("[possible values: continuous, binary, two-width, force]"), "{message}");
-}
-
-#[test]
-fn flags_without_effect_and_unknown_policies_are_refused() {
-    let project = policy_project(WANDERS);
-    for (words, output) in [
-        ("--policy noop --replan 3", "--replan: has no effect on the policy noop"),
-        ("--protocol vla-eval", "--protocol: has no effect on the policy expert"),
-        ("--policy random --profile vision", "--profile: has no effect on the policy"),
-        ("--policy noop --gripper binary", "--gripper: has no effect on the policy noop"),
-        ("--policy q.lua", "q.lua: no such file"),
-        ("--policy ws://127.0.0.1:99999", "\"99999\" is not a port"),
-        ("--policy wss://host:1", "use a tunnel"),
-        ("--policy exprt", "did you mean expert"),
-        ("--policy ws://127.0.0.1:9 --profile pi", "possible values: vision, vision_drives"),
-        ("--policy noop --require safety>=90", "a share of 1"),
-    ] {
-        let message = project.refusal(&format!("x.lua {words} --out run"));
-        assert!(message.contains(output), "{words}: {message}");
-        assert!(!project.path("run").exists(), "{words}");
-    }
-    let message = project.refusal("p.lua");
-    assert!(
-        message.contains("which is not a plan; run a suite, and give this file as its policy"),
-        "{message}"
-    );
-}
-
-#[test]
-fn policies_and_profiles_in_lua_are_listed() {
-    let project = policy_project(WANDERS);
-    project.write("scripts/policies/mine.lua", b"-- Mine. It is good.\nreturn 1\n");
-    let listed = |what: &str| project.succeeds(&format!("list {what}")).out;
-    let policies = listed("policies");
-    for name in ["tactile-servo", "scripts/policies/mine.lua", "scripts/policies/hold.lua"] {
-        assert!(policies.contains(name), "{name}\n{policies}");
-    }
-    let mine = policies.lines().find(|line| line.starts_with("scripts/policies/mine.lua"));
-    assert!(mine.is_some_and(|line| line.ends_with("  Mine")), "{policies}");
-    for line in ["visuo_tactile", "scripts/profiles/libero.lua"] {
-        assert!(listed("profiles").contains(line), "{line}\n{}", listed("profiles"));
-    }
 }
 
 #[test]
@@ -109,4 +65,13 @@ return softvt.policy {{ name = 'flip', privileged = in_episode, {body} }}"
     let output = project.succeeds("x.lua --policy p.lua --threads 1 --out run");
     assert!(output.err.contains("granted: false") && !output.err.contains("granted: true"), "{}", output.err);
     assert_eq!(project.json("run/run.json")["privileged"], false);
+}
+
+#[test]
+fn a_policy_that_is_run_as_a_script_is_refused() {
+    let message = policy_project(WANDERS).refusal("p.lua");
+    assert!(
+        message.contains("which is not a plan; run a suite, and give this file as its policy"),
+        "{message}"
+    );
 }

@@ -119,3 +119,15 @@ fn a_report_has_pictures_of_the_objects_of_runs_with_their_scripts() {
     std::fs::remove_file(project.path("run/scripts.zip")).expect("removed");
     assert_eq!(pictures("without"), 0);
 }
+
+#[test]
+fn a_run_with_a_seed_file_is_repeated_with_it_alone() {
+    let project = Small { task: "budget_steps = 3", ..Small::default() }.project();
+    project.write("secret", b"correct horse battery staple");
+    project.succeeds("x.lua --policy noop --seed-file secret --out run");
+    let hash = project.json("run/run.json")["seed_hash"].as_str().expect("a hash").to_owned();
+    assert!(project.succeeds("replay run 0/0 --seed-file secret").out.contains("byte-identical"));
+    assert!(project.refusal("replay run 0/0").contains("give the file with that seed"));
+    project.succeeds("report run --out page");
+    assert!(project.text("page/report.html").contains(&format!("secret, SHA-256 {hash}")));
+}

@@ -1,49 +1,26 @@
 //! `softvt serve` as a process: its end, its memory, and its flags.
 
-use std::{
-    io::{BufRead, BufReader, Read},
-    net::TcpListener,
-    process::{Child, ChildStdout, Command, Stdio},
-};
+use std::net::TcpListener;
 
-use assert_cmd::cargo::cargo_bin;
 use rmpv::Value;
 
 use crate::support::{
-    CliOutput, Project, Small,
+    CliOutput, Process, Project, Small,
     client::{Client, map, text},
 };
 
-/// A server that ends with the test.
+/// A server of episodes.
 pub struct Server {
-    child: Child,
-    output: BufReader<ChildStdout>,
+    pub process: Process,
     address: String,
-}
-
-impl Drop for Server {
-    fn drop(&mut self) {
-        let _ = self.child.kill();
-        let _ = self.child.wait();
-    }
 }
 
 impl Server {
     pub fn start(project: &Project, words: &str) -> Self {
-        let mut child = Command::new(cargo_bin!("softvt"))
-            .current_dir(project.path(""))
-            .args(["serve", "x.lua", "--port", "0"])
-            .args(words.split_whitespace())
-            .stdin(Stdio::piped())
-            .stdout(Stdio::piped())
-            .stderr(Stdio::piped())
-            .spawn()
-            .expect("started");
-        let mut line = String::new();
-        let mut output = BufReader::new(child.stdout.take().expect("an output"));
-        output.read_line(&mut line).expect("a line");
-        let address = line.trim().strip_prefix("ws://").unwrap_or_else(|| panic!("no address: {line:?}"));
-        Self { address: address.to_owned(), child, output }
+        let mut process = project.start(&format!("serve x.lua --port 0 {words}"));
+        let line = process.line();
+        let address = line.strip_prefix("ws://").unwrap_or_else(|| panic!("no address: {line:?}")).to_owned();
+        Self { process, address }
     }
 
     /// A connected client, and the hello message.
@@ -51,26 +28,11 @@ impl Server {
         Client::connect(&self.address)
     }
 
-    /// Closes the standard input of the server.
-    pub fn close_stdin(&mut self) {
-        drop(self.child.stdin.take());
-    }
-
     /// Ends the server by Ctrl-C, and returns what it printed after its address.
     #[cfg(unix)]
-    pub fn interrupt(self) -> CliOutput {
-        let id = self.child.id().to_string();
-        assert!(Command::new("kill").args(["-INT", &id]).status().expect("kill runs").success());
-        self.wait()
-    }
-
-    /// Waits until the server has ended, and returns what it printed after its address.
-    pub fn wait(mut self) -> CliOutput {
-        let (mut out, mut err) = (String::new(), String::new());
-        self.output.read_to_string(&mut out).expect("text");
-        self.child.stderr.take().expect("messages").read_to_string(&mut err).expect("text");
-        let code = self.child.wait().expect("ended").code().unwrap_or(-1);
-        CliOutput { code, out, err }
+    pub fn interrupt(mut self) -> CliOutput {
+        self.process.signal("-INT");
+        self.process.wait()
     }
 }
 
@@ -83,14 +45,14 @@ fn a_server_ends_with_its_standard_input_if_asked_to() {
     let project = project();
     let mut server = Server::start(&project, "--profile vision --until-stdin-closes");
     server.client().0.reset(0);
-    server.close_stdin();
-    let output = server.wait();
+    server.process.close_stdin();
+    let output = server.process.wait();
     assert_eq!((output.code, output.out.as_str()), (0, ""), "{}", output.err);
     assert!(!output.err.contains("interrupt"), "{}", output.err);
 
     let mut other = Server::start(&project, "--profile vision");
     let (mut client, _) = other.client();
-    other.close_stdin();
+    other.process.close_stdin();
     // It is there for several episodes more.
     for episode in 0..3 {
         client.reset(episode);
@@ -105,7 +67,7 @@ fn images_of_any_size_do_not_fill_the_memory() {
     let server = Server::start(&project, "--profile vision");
     let resident_mib = || {
         let status =
-            std::fs::read_to_string(format!("/proc/{}/status", server.child.id())).expect("a process");
+            std::fs::read_to_string(format!("/proc/{}/status", server.process.id())).expect("a process");
         let line = status.lines().find(|line| line.starts_with("VmHWM:")).expect("a line");
         line.split_whitespace().nth(1).and_then(|kib| kib.parse::<u64>().ok()).expect("a number") >> 10
     };
@@ -128,24 +90,14 @@ fn images_of_any_size_do_not_fill_the_memory() {
 }
 
 #[test]
-fn invalid_servers_are_refused() {
+fn addresses_that_cannot_be_used_are_refused() {
     let project = project();
-    project.write(
-        "e.lua",
-        b"return softvt.experiment { name = \"e\", grid = { a = { 1 } }, run = function() end }",
-    );
     let taken = TcpListener::bind("127.0.0.1:0").expect("a port");
     let port = taken.local_addr().expect("an address").port();
     for (words, expected) in [
         (format!("serve x.lua --port {port}"), "already in use at 127.0.0.1"),
-        ("serve e.lua".to_owned(), "expected a suite or a list of suites"),
-        ("serve x.lua --policy noop".to_owned(), "unexpected argument '--policy'"),
-        ("serve x.lua --port 70000".to_owned(), "70000"),
         ("serve x.lua --host 192.0.2.7 --port 0".to_owned(), "cannot listen on this address"),
-        ("serve x.lua --split test".to_owned(), "expected validation"),
-        ("serve x.lua --shift warp=1 --port 0".to_owned(), "unknown shift \"warp\""),
-        ("serve x.lua --profile pi".to_owned(), "visuo_tactile"),
-        ("serve x.lua --token".to_owned(), "--token"),
+        (format!("watch x.lua --port {port}"), "choose another, or 0 for any free port"),
     ] {
         let message = project.refusal(&words);
         assert!(message.contains(expected), "{words}: {message}");
@@ -159,13 +111,10 @@ fn an_interrupt_closes_the_server() {
     let mut server = Server::start(&project, "--profile vision");
     let (mut client, _) = server.client();
     client.reset(0);
-    let id = server.child.id().to_string();
-    assert!(Command::new("kill").args(["-INT", &id]).status().expect("kill runs").success());
+    server.process.signal("-INT");
     assert!(client.0.read().is_ok_and(|m| m.is_close()), "clients get a close frame");
-    let code = server.child.wait().expect("ended").code();
-    let mut err = String::new();
-    server.child.stderr.take().expect("messages").read_to_string(&mut err).expect("text");
-    assert_eq!(code, Some(130), "{err}");
+    let CliOutput { code, err, .. } = server.process.wait();
+    assert_eq!(code, 130, "{err}");
     assert!(!err.contains("panicked") && !err.contains("did not finish"), "{err}");
     assert!(!err.contains("interrupted") && !err.contains("finishing"), "nothing is lost: {err}");
 }

@@ -56,8 +56,8 @@ fn the_end_of_a_recording_server_is_reported() {
 
     let mut server = serve(&project, "--episodes 2 --out served --name mine --resume --until-stdin-closes");
     assert!(run_episode(&project, &mut server.client().0, 0));
-    server.close_stdin();
-    let output = server.wait();
+    server.process.close_stdin();
+    let output = server.process.wait();
     assert_eq!(output.code, 0, "{}", output.err);
     assert!(output.err.ends_with("softvt: 2 of 2 episodes are in served\n"), "{}", output.err);
     let server = serve(&project, "--episodes 2 --out served --name mine --resume");
@@ -79,31 +79,22 @@ fn a_server_that_cannot_write_ends() {
     let answer = client.ask(&step(&recorded(&project, 0)));
     let message = get(&answer, "error").as_str().expect("an error");
     assert!(message.contains("cannot be recorded") && message.contains("actions"), "{message}");
-    let output = server.wait();
+    let output = server.process.wait();
     assert_eq!(output.code, 2, "{}", output.err);
     assert!(output.err.ends_with("\n1 of 2 episodes are in served\n"), "{}", output.err);
     assert_eq!(project.lines("served/episodes.jsonl").len(), 1, "no line without its files");
 }
 
 #[test]
-fn folders_and_flags_that_do_not_fit_are_refused() {
+fn folders_that_do_not_fit_are_refused() {
     let project = project();
     let server = serve(&project, "--episodes 2 --out served");
     assert!(run_episode(&project, &mut server.client().0, 0));
     let busy = project.refusal(&format!("serve x.lua --port 0 {FLAGS} --episodes 2 --out served --resume"));
     assert!(busy.contains("another softvt process is using served"), "{busy}");
     server.interrupt();
-    for (words, expected) in [
-        ("--out served", "served already holds a run (run.json): resume it, or"),
-        ("--resume", "--out <DIR>"),
-        ("--episodes 2", "required arguments were not provided:\n  --out <DIR>"),
-        ("--shard 1/2", "--out <DIR>"),
-        ("--name mine", "--out <DIR>"),
-        ("--task 7", "--task 7: suite one has no such task"),
-    ] {
-        let message = project.refusal(&format!("serve x.lua --port 0 {FLAGS} {words}"));
-        assert!(message.contains(expected), "{words}: {message}");
-    }
+    let again = project.refusal(&format!("serve x.lua --port 0 {FLAGS} --out served"));
+    assert!(again.contains("served already holds a run (run.json): resume it, or"), "{again}");
     let output = serve(&project, "--out empty").interrupt();
     assert!(output.err.ends_with("interrupted; no episode was recorded\n"), "{}", output.err);
     assert!(!project.path("empty").exists() && output.out.is_empty(), "{}", output.out);

@@ -2,54 +2,35 @@
 
 use std::{
     fs,
-    io::{BufRead, BufReader, Read, Write},
+    io::{Read, Write},
     net::TcpStream,
-    process::{Child, Command, Stdio},
-    thread,
-    time::{Duration, Instant},
+    process::Command,
 };
 
 use assert_cmd::cargo::cargo_bin;
 use serde_json::{Value, json};
 use tungstenite::{Message, WebSocket};
 
-use crate::support::{Project, Small, refusal};
+use crate::support::{Process, Project, Small, refusal};
 
-/// A page that ends with the test.
+/// A page.
 struct Page {
-    child: Child,
+    process: Process,
     /// `HOST:PORT`.
     address: String,
     token: String,
 }
 
-impl Drop for Page {
-    fn drop(&mut self) {
-        let _ = self.child.kill();
-        let _ = self.child.wait();
-    }
-}
-
 impl Page {
     fn start(project: &Project, words: &str) -> Self {
-        Self::start_by(Command::new(cargo_bin!("softvt")), project, words)
+        Self::of(project.start(&format!("watch {words}")))
     }
 
-    /// As [`Self::start`], by a command that runs the binary with further words.
-    fn start_by(mut command: Command, project: &Project, words: &str) -> Self {
-        let mut child = command
-            .current_dir(project.path(""))
-            .arg("watch")
-            .args(words.split_whitespace())
-            .stdout(Stdio::piped())
-            .stderr(fs::File::create(project.path("messages.txt")).expect("a file"))
-            .spawn()
-            .expect("started");
-        let mut line = String::new();
-        BufReader::new(child.stdout.take().expect("an output")).read_line(&mut line).expect("a line");
-        let url = line.trim().strip_prefix("http://").unwrap_or_else(|| panic!("no address: {line:?}"));
+    fn of(mut process: Process) -> Self {
+        let line = process.line();
+        let url = line.strip_prefix("http://").unwrap_or_else(|| panic!("no address: {line:?}"));
         let (address, token) = url.split_once("/?token=").expect("a token");
-        Self { address: address.to_owned(), token: token.to_owned(), child }
+        Self { address: address.to_owned(), token: token.to_owned(), process }
     }
 
     /// The status and the text of the answer to a request.
@@ -236,7 +217,7 @@ fn connections_that_say_nothing_do_not_end_the_page() {
     let project = project();
     let mut limited = Command::new("sh");
     limited.args(["-c", "ulimit -n 64; exec \"$0\" \"$@\""]).arg(cargo_bin!("softvt"));
-    let page = Page::start_by(limited, &project, "x.lua");
+    let page = Page::of(Process::start(limited, &project, "watch x.lua"));
     page.feed().until("end");
     // More than the process has descriptors for. They are closed at the end of the time for a request.
     let _silent: Vec<TcpStream> =
@@ -300,58 +281,41 @@ fn a_run_is_shown_by_its_actions_and_teleoperation_is_recorded() {
 #[test]
 fn a_drive_ends_with_its_page_and_goes_on_when_it_is_loaded_again() {
     let project = Small { task: "budget_steps = 100", expert: "arm:wait(1)", ..Small::default() }.project();
-    let page = Page::start(&project, "x.lua --out driven");
+    let mut page = Page::start(&project, "x.lua --out driven");
     let mut feed = page.feed();
     feed.until("end");
-    let start = |feed: &mut Feed| {
+    let start = |page: &Page, feed: &mut Feed| {
         assert_eq!(page.post("/select", &json!({ "policy": "teleop" })).0, 200);
         feed.until("open");
         feed.until("state");
     };
-    start(&mut feed);
+    start(&page, &mut feed);
     drop(feed);
-    let messages = || fs::read_to_string(project.path("messages.txt")).unwrap();
-    let begun = Instant::now();
-    while !messages().contains("the drive of task 0 episode 0 was not finished and is not recorded") {
-        assert!(begun.elapsed() < Duration::from_secs(60), "{}", messages());
-        thread::sleep(Duration::from_millis(100));
-    }
-    assert!(!project.path("driven").exists());
+    page.process.await_message("the drive of task 0 episode 0 was not finished and is not recorded", 1);
     let mut feed = page.feed();
     let (error, _) = feed.until("error");
     assert!(error["message"].as_str().unwrap().contains("the page was closed"), "{error}");
+    assert!(!project.path("driven").exists());
 
-    start(&mut feed);
+    start(&page, &mut feed);
     drop(feed);
-    thread::sleep(Duration::from_secs(1));
     assert_eq!(page.feed().until("end").1, 101);
-    let begun = Instant::now();
-    while !messages().contains("[1/") {
-        assert!(begun.elapsed() < Duration::from_secs(60), "{}", messages());
-        thread::sleep(Duration::from_millis(100));
-    }
+    page.process.await_message("[1/", 1);
 }
 
 #[test]
 fn what_cannot_be_shown_is_refused() {
     let project = project();
     project.succeeds("x.lua --out run");
-    let taken = std::net::TcpListener::bind("127.0.0.1:0").unwrap();
-    let port = taken.local_addr().unwrap().port();
     for (words, expected) in [
-        (format!("watch x.lua --port {port}"), "choose another, or 0 for any free port"),
-        ("watch x.lua --task nothing".to_owned(), "nothing"),
-        ("watch run --seed 3".to_owned(), "--seed: has no effect on the run run; leave it out"),
-        ("watch run --policy noop".to_owned(), "--policy: has no effect on the run run; leave it out"),
-        ("watch run --task cube".to_owned(), "--task: expected the index"),
-        ("watch none.lua".to_owned(), "none.lua"),
-        ("watch none".to_owned(), "none: no such file or folder; give a Lua file or a run folder"),
-        ("watch run --episode 9".to_owned(), "run: the run has no episode 9 of task 0; it has 0"),
-        ("watch run --task 5".to_owned(), "run: the run has no episode of task 5"),
-        ("compare run run".to_owned(), "run and run are the same folder; give different runs"),
-        ("watch x.lua --episodes 3".to_owned(), "--out"),
+        ("watch run --seed 3", "--seed: has no effect on the run run; leave it out"),
+        ("watch run --policy noop", "--policy: has no effect on the run run; leave it out"),
+        ("watch run --task cube", "--task: expected the index"),
+        ("watch run --episode 9", "run: the run has no episode 9 of task 0; it has 0"),
+        ("watch run --task 5", "run: the run has no episode of task 5"),
+        ("compare run run", "run and run are the same folder; give different runs"),
     ] {
-        let message = project.refusal(&words);
+        let message = project.refusal(words);
         assert!(message.contains(expected), "{words}: {message}");
     }
 }
@@ -363,7 +327,6 @@ fn an_interrupt_ends_the_page_though_another_reads_nothing() {
     let mut page = Page::start(&project, "x.lua");
     let mut feed = page.feed();
     feed.until("scene");
-    let id = page.child.id().to_string();
-    assert!(Command::new("kill").args(["-INT", &id]).status().expect("kill runs").success());
-    assert_eq!(page.child.wait().expect("ended").code(), Some(130));
+    page.process.signal("-INT");
+    assert_eq!(page.process.wait().code, 130);
 }

@@ -60,13 +60,24 @@ fn mesh_files() {
         let glb = |cube: Glb| Glb { json: changed(&cube.json, &input.shown), ..cube }.bytes();
         let no_file = |name: &str| Err(format!("no file {name}"));
         let answer = match name {
-            "obj" => solid(read_obj(&file(0))).map_err(|error| error.to_string()),
+            "obj" => {
+                let colours = import_colours(file(0).as_bytes(), MeshFormat::Obj, &no_file);
+                solid(read_obj(&file(0)))
+                    .map_err(|error| error.to_string())
+                    .and_then(|solid| colours.map(|_| solid))
+            }
             "obj_files" => solid(read_obj(&input.text)).map_err(|error| error.to_string()),
             "obj_materials" => {
-                materials(import_colours(file(0).as_bytes(), MeshFormat::Obj, &|name| match name {
-                    "cube.mtl" => Ok(file(1).into_bytes()),
-                    other => no_file(other),
-                }))
+                let vertices = read_obj(&file(0)).map_or(0, |mesh| mesh.vertices.len());
+                let materials = self::materials(import_colours(
+                    file(0).as_bytes(),
+                    MeshFormat::Obj,
+                    &|name| match name {
+                        "cube.mtl" => Ok(file(1).into_bytes()),
+                        other => no_file(other),
+                    },
+                ));
+                materials.map(|materials| format!("{vertices} vertices\n{materials}"))
             }
             "glb" => {
                 let bytes = glb(Glb::new(&read_obj(CUBE).expect("a cube")));

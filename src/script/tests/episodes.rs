@@ -140,18 +140,6 @@ fn an_episode_runs_on_the_files_of_its_plan() {
 }
 
 #[test]
-fn a_shift_changes_the_scene() {
-    let shift = "softvt.shift { name = 'stiffness', default = 1, apply = function(scene, value)
-        local o = scene:object 'ball' o.youngs_pa = o.youngs_pa * value return scene end }";
-    let loaded = project(&format!("return suite(nil, {{ {shift} }})")).load("x.lua", &[]).unwrap();
-    let shifts = [ShiftValue { name: "stiffness".into(), value: 0.5 }];
-    let changes = SceneChanges { shifts: shifts.into(), ..SceneChanges::default() };
-    let scene = EpisodeSetup::open(&loaded, &episode_id(0, 1), &changes).unwrap().scene;
-    let Body::Soft(soft) = &scene.objects[0].asset.body else { panic!("the ball is soft") };
-    assert_eq!(soft.elastic.youngs_pa(), 20e3);
-}
-
-#[test]
 fn the_library_scales_stiffness_and_mass() {
     let project =
         project("local shifts = require 'shifts'\nreturn suite(nil, { shifts.stiffness, shifts.mass })");
@@ -185,18 +173,6 @@ fn an_expert_that_gives_up_is_done_and_its_reason_is_kept() {
     }
     assert_eq!((commands, expert.gave_up()), (2, Some("too slippery")));
     assert_eq!(step(&mut expert).unwrap(), None, "it is not resumed");
-}
-
-#[test]
-fn an_object_can_stand_on_another() {
-    let text = "return softvt.suite { name = 'test', object_type = 'rigid', tasks_differ_in = 'object', tasks = { softvt.task {\n\
-        prompt = 'p', goal = softvt.on { object = 'a', target = 'b' }, layout = softvt.layout('two', function(scene)\n\
-        scene:add { name = 'b', asset = ball, at = { 0.1, 0 } }\n\
-        scene:add { name = 'a', asset = ball, at = { 0.1, 0 }, on = 'b' }\nend) } } }";
-    let loaded = project(text).load("x.lua", &[]).unwrap();
-    let scene = EpisodeSetup::open(&loaded, &episode_id(0, 1), &SceneChanges::default()).unwrap().scene;
-    assert!((scene.objects[1].pose_w.translation.z - 0.06).abs() < 1e-6);
-    assert!(std::sync::Arc::ptr_eq(&scene.objects[0].asset, &scene.objects[1].asset));
 }
 
 #[test]
@@ -269,19 +245,4 @@ fn a_prompt_may_depend_on_what_was_drawn() {
     assert!(prompts.iter().any(|p| p.starts_with("lift")) && prompts.iter().any(|p| p.starts_with("raise")));
     let shouted = setup(0, &[ShiftValue { name: "shout".into(), value: 1.0 }]);
     assert_eq!((shouted.prompt, shouted.nominal_prompt), (format!("{}!", prompts[0]), prompts[0].clone()));
-}
-
-#[test]
-fn an_expert_learns_what_the_arm_reaches() {
-    let (_project, mut expert) = expert(
-        "local down = softvt.pose { position = { -0.15, 0.1, 0.2 }, quaternion = { 0, 1, 0, 0 } }
-         local near, none = arm:reaches(down)
-         local far, miss = arm:reaches(down:at { 1.2, 0, 0.2 })
-         arm:note('near', near and none == 0 and 1 or 0) arm:note('far', far and 1 or 0) arm:note('miss_m', miss)
-         arm:wait(1)",
-    );
-    step(&mut expert).expect("a command");
-    let notes = expert.notes();
-    assert_eq!((notes["near"], notes["far"]), (1.0, 0.0));
-    assert!((0.5..1.5).contains(&notes["miss_m"]), "{notes:?}");
 }

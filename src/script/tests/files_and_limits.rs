@@ -160,3 +160,20 @@ fn texts_that_are_shared_are_counted_each_time() {
         assert!(message.contains(expected) && message.contains("x.lua:1"), "{message}");
     }
 }
+
+#[test]
+fn a_calibration_is_read_when_the_plan_is_made_and_no_later() {
+    let late = "local none = softvt.calibration 'absent'
+        return softvt.experiment { name = 'e', grid = { a = { 1 } }, run = function()
+        return { none = tostring(none), late = pcall(softvt.calibration, 'sphere') and 'given' or 'refused' } end }";
+    let project = Project::new(&[("x.lua", late)]);
+    let loaded = project.load("x.lua", &[]).expect("loads");
+    // A file that was absent stays absent in later virtual machines, even if it exists by then.
+    project.write("assets/calibration/absent.json", b"{}");
+    let rows = Experiment::open(&loaded).expect("opens").run(0).expect("a row");
+    assert_eq!(
+        (&rows[0]["none"], &rows[0]["late"]),
+        (&"nil".into(), &"refused".into()),
+        "requested too late"
+    );
+}

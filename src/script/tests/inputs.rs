@@ -12,11 +12,17 @@ use softvt_benchmark::{Plan, ShiftValue};
 use softvt_common::text::counted;
 use softvt_policy::Policy;
 
-/// Compares the answers to the inputs of a folder. Every input is the file `x.lua` of a project.
+/// Path of the file of an input in its project.
+fn main(input: &Input) -> &str {
+    input.properties.get("main").map_or("x.lua", String::as_str)
+}
+
+/// Compares the answers to the inputs of a folder.
 fn check(folder: &str, answer: impl Fn(&Project, &Input) -> Result<String, String>) {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/bad").join(folder);
     fixtures::check(&folder, |_, input| {
-        let project = Project::new(&[("small.lua", include_str!("bad/small.lua")), ("x.lua", &input.text)]);
+        let project =
+            Project::new(&[("small.lua", include_str!("bad/small.lua")), (main(input), &input.text)]);
         input.files.iter().for_each(|(path, text)| project.write(path, text.as_bytes()));
         let answer = answer(&project, input).unwrap_or_else(|message| message);
         let folder = project.path("").display().to_string();
@@ -42,7 +48,7 @@ fn check_scripts(folder: &str) {
     check(folder, |project, input| {
         let argv = input.properties.get("argv").map_or("", String::as_str);
         let loaded = project
-            .load("x.lua", &argv.split_whitespace().collect::<Vec<_>>())
+            .load(main(input), &argv.split_whitespace().collect::<Vec<_>>())
             .map_err(|error| error.to_string())?;
         first_result(&loaded, input).map_err(|error| error.to_string())
     });

@@ -48,17 +48,6 @@ fn start_values_are_those_given_or_zero() {
 }
 
 #[test]
-fn objects_can_rest_on_a_moved_part() {
-    let place = "scene:add { name = 'chest', asset = chest, at = { 0.1, 0 }, yaw = math.pi, joints = { drawer = 0.08 } }\n\
-                 scene:add { name = 'ball', asset = ball, at = { 0.1, 0.1 }, on = 'chest.drawer' }\n\
-                 scene:add { name = 'low', asset = ball, at = { 0.1, -0.03 }, on = 'chest' }";
-    let scene = open(&suite(&chest(SLIDER, ""), place)).unwrap();
-    let height = |index: usize| scene.objects[index].pose_w.translation.z;
-    assert!((height(1) - 0.065).abs() < 1e-6, "on the drawer: {}", height(1));
-    assert!((height(2) - 0.03).abs() < 1e-6, "next to it, on the base: {}", height(2));
-}
-
-#[test]
 fn thin_walls_are_refused_at_the_placement() {
     let thin = chest(SLIDER, "")
         .replace("shape = box:translate(0, 0, 0.05)", "shape = box:shell(0.0015):translate(0, 0, 0.05)");

@@ -4,7 +4,6 @@ mod episodes;
 mod files_and_limits;
 mod inputs;
 mod joints;
-mod mass_and_calibration;
 mod options;
 mod policies;
 mod shifts;

@@ -7,29 +7,7 @@ use softvt_common::episode_id::{EpisodeId, EpisodeSplit};
 use softvt_evaluation::thresholds::ThresholdFile;
 use softvt_scene::{HiddenProperties, Object};
 
-const ASSETS: &str = r#"
-local mat = softvt.asset { name = "mat", shape = softvt.shape.box { size = { 0.2, 0.2, 0.01 } }:grounded(), body = softvt.static {} }
-local function ball(body)
-  return softvt.asset { name = "ball", shape = softvt.shape.sphere { radius = 0.03 }:grounded(), body = body, hints = { grasp_height_m = 0.03 } }
-end
-local soft = ball(softvt.soft { youngs_pa = 40e3, poisson = 0.4, density = 200 })
-local rigid = ball(softvt.rigid { density = 200 })
-local ranges = { name = "test", size = { 0.9, 1.1 }, stiffness = { 0.5, 2 }, density = { 0.6, 1.8 }, friction = { 0.7, 1.4 }, colour = 0.1,
-  light = { 0.7, 1.4 }, camera_offset = 0.01, camera_rotation = 0.02 }
-local function suite(build, vary, type)
-  local layout = softvt.layout("pair", function(scene, rng)
-    scene:add { name = "mat", asset = mat, at = { 0.3, 0 } }
-    build(scene, rng)
-  end)
-  local function task(name)
-    return softvt.task { prompt = "lift " .. name, layout = layout, goal = softvt.on { object = name, target = "mat" } }
-  end
-  return softvt.suite { name = "test", object_type = type or "deformable", tasks_differ_in = "spatial", vary = vary, tasks = { task "left", task "right" } }
-end
-local function pair(scene, rng)
-  for k, name in ipairs { "left", "right" } do scene:add { name = name, asset = soft, at = { 0.1 * k + rng:uniform(0, 0.01), 0 } } end
-end
-"#;
+const ASSETS: &str = include_str!("lua/varied_suite.lua");
 
 fn project(rest: &str) -> Project {
     Project::new(&[("x.lua", &format!("{ASSETS}{rest}"))])
@@ -149,52 +127,7 @@ fn the_standard_variation_applies_to_any_suite_of_soft_objects() {
 }
 
 /// Checks `experts.blind_grips` in Lua against a search over numbers and other instances.
-const BLIND_GRIPS: &str = r#"
-local blind_grips, grasp = require "experts.blind_grips", require "experts.grasp"
-local function instance(scale, youngs_factor, density_factor)
-  return { name = "ball", asset = "sphere", scale = scale, youngs_factor = youngs_factor, density_factor = density_factor,
-    hints = {}, size = { 0.06 * scale, 0.06 * scale, 0.06 * scale }, draws = 1 }
-end
--- Instances by a low-discrepancy sequence (additive recurrence) that begins at `first`.
-local function drawn(first, size)
-  local instances = {}
-  function instances:sample(object, count)
-    local list = {}
-    for k = first, first + count - 1 do
-      local function share(step) return (0.5 + k * step) % 1 end
-      local scale = size[1] + (size[2] - size[1]) * share(0.8191725)
-      list[#list + 1] = instance(scale, 0.5 * 4 ^ share(0.6710436), 0.6 * 3 ^ share(0.5497005))
-    end
-    return list
-  end
-  function instances:kinds() return { "sphere" } end
-  return instances
-end
-local size = { 0.88, 1.12 }
-local function best(name, size) return blind_grips.best(name, blind_grips.sample(name, drawn(1, size), "ball")) end
-
--- No other closure is safe for more instances, up to the error of a sample; knowing the size is worth something.
-local others = blind_grips.sample("fixed-closure", drawn(5000, size), "ball")
-local fixed, most = best("fixed-closure", size), 0
-for closure = 0.2, 0.6, 0.01 do
-  most = math.max(most, blind_grips.share({ value = closure, size_power = 0, of = fixed.of }, others))
-end
-local own = blind_grips.share(fixed, others)
-assert(own >= most - 0.03 and own < 0.95, ("%g of at most %g"):format(own, most))
-assert(math.abs(own - fixed.share) < 0.05, "the share of the sample it was chosen on")
-assert(blind_grips.share(best("size-seen", size), others) > own + 0.2)
-
--- Of instances that differ in the size alone, a closure by size suits more than any one closure.
-local alike = {}
-function alike:sample(object, count)
-  local list = {}
-  for k = 1, count do list[k] = instance(0.88 + 0.24 * k / count, 1, 1) end
-  return list
-end
-local function share(name) return blind_grips.best(name, blind_grips.sample(name, alike, "ball")).share end
-assert(share("size-seen") == 1 and share("fixed-closure") < 0.9, share("fixed-closure"))
-return suite(pair)
-"#;
+const BLIND_GRIPS: &str = include_str!("lua/blind_grips.lua");
 
 #[test]
 fn controllers_without_touch_suit_most_instances_of_a_sample() {
@@ -204,15 +137,7 @@ fn controllers_without_touch_suit_most_instances_of_a_sample() {
 }
 
 /// A suite of the calibrated sphere with hidden properties.
-const HIDDEN: &str = r#"
-local ranges = { name = "test", size = { 0.9, 1.1 }, stiffness = { 1, 1 }, density = { 1, 1 }, friction = { 1, 1 }, colour = 0.1,
-  light = { 1, 1 }, camera_offset = 0, camera_rotation = 0,
-  hidden = { aeration = { 0.5, 2.5 }, staling = { 1, 6 }, filling = { 1, 4 }, coating = { 0.2, 1.5 }, window_ratio = { 1.5, 2.2 } } }
-local sphere = require "assets.sphere"
-local function placed(asset)
-  return function(scene) for k, name in ipairs { "left", "right" } do scene:add { name = name, asset = asset, at = { 0.1 * k, 0 } } end end
-end
-"#;
+const HIDDEN: &str = include_str!("lua/hidden_suite.lua");
 
 #[test]
 fn hidden_properties_change_material_limit_and_surface_within_the_window() {

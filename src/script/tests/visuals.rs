@@ -75,25 +75,6 @@ fn every_mask_can_be_made_from_lua() {
 }
 
 #[test]
-fn painted_shapes_need_a_visual_per_material_or_none_at_all() {
-    let painted = |visuals: &str| {
-        let asset = format!(
-            "local asset = softvt.asset {{ name = \"bun\", body = softvt.scenery {{}}, {visuals}\n  shape = softvt.shape.sphere \
-             {{ radius = 0.03 }}:paint {{ material = 2, region = softvt.shape.sphere {{ radius = 0.01 }} }}:grounded() }}\n"
-        );
-        let add = "scene:add { name = \"bun\", asset = asset, position = { 0, 0, 0 } }\n  scene:add { name = \"ball\",";
-        let text = asset + &SUITE.replace("scene:add { name = \"ball\",", add) + "\nreturn suite()";
-        let project = Project::new(&[("suites/x.lua", &text)]);
-        let loaded = project.load("suites/x.lua", &[]).unwrap();
-        EpisodeSetup::open(&loaded, &episode_id(0, 0), &SceneChanges::default())
-            .map(|episode| episode.scene.objects[0].asset.visuals.len())
-    };
-    assert_eq!(painted("").unwrap(), 3);
-    let looks = |count: usize| format!("visuals = {{ {} }},", "{ albedo = { 1, 1, 1 } },".repeat(count));
-    assert_eq!(painted(&looks(3)).unwrap(), 3);
-}
-
-#[test]
 fn every_material_of_the_library_is_a_visual() {
     let names =
         "crust dough frosting foam silicone seeds ceramic wood floorboards steel fabric paint".split(' ');

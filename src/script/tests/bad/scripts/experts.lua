@@ -41,3 +41,8 @@ assert(far == 0.2 and none == nil, tostring(far))
 assert(near < 0 and ball == 'ball', tostring(near))
 assert(scene:clearance(on, { ignore = { 'ball' } }) == 0.2)
 scene:clearance(on, { ignore = { 'bal' } })
+
+local down = softvt.pose { position = { -0.15, 0.1, 0.2 }, quaternion = { 0, 1, 0, 0 } }
+local near, none = arm:reaches(down)
+local far, miss = arm:reaches(down:at { 1.2, 0, 0.2 })
+assert(near and none == 0 and not far and miss > 0.5 and miss < 1.5, miss)

@@ -94,3 +94,19 @@ scene:add { name = 'high', asset = small.ball, at = { 0.3, 0 }, on = 'low' }
 scene:add { name = 'bun', position = { 0, 0, 0 }, asset = softvt.asset { name = 'bun', body = softvt.scenery {},
   shape = small.ball.shape:paint { material = 2, region = softvt.shape.sphere { radius = 0.01 } },
   visuals = { { albedo = { 1, 1, 1 } }, { albedo = { 1, 1, 1 } } } } }
+
+-- Objects of one asset, one on the other.
+scene:add { name = 'low', asset = small.ball, at = { 0.1, 0 } }
+scene:add { name = 'high', asset = small.ball, at = { 0.1, 0 }, on = 'low' }
+assert(math.abs(scene:object('high').position[3] - 0.06) < 1e-6)
+
+-- Without visuals, a painted shape gets one for each material.
+local shape = small.ball.shape:paint { material = 2, region = softvt.shape.sphere { radius = 0.01 } }
+scene:add { name = 'bun', asset = softvt.asset { name = 'bun', body = softvt.scenery {}, shape = shape }, position = { 0, 0, 0 } }
+assert(#scene:object('bun').materials == 3)
+
+local shape = small.ball.shape:paint { material = 2, region = softvt.shape.sphere { radius = 0.01 } }
+local look = { albedo = { 1, 1, 1 } }
+scene:add { name = 'bun', position = { 0, 0, 0 },
+  asset = softvt.asset { name = 'bun', body = softvt.scenery {}, shape = shape, visuals = { look, look, look } } }
+assert(#scene:object('bun').materials == 3)

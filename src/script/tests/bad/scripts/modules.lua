@@ -29,3 +29,21 @@ require 'late'
 -- file: late.lua
 local x
 return x.y
+
+-- main: suites/shifts.lua
+local shifts = require 'shifts'
+error(shifts.soft[1].name, 0)
+
+-- main: suites/x.lua
+error(require 'shifts', 0)
+-- file: suites/shifts.lua
+return 'the suite'
+-- file: scripts/shifts.lua
+return 'the module'
+
+-- Points may read files, which later machines then hold.
+return softvt.experiment { name = 'e',
+  points = function() return { { a = require('lib').value } } end,
+  run = function(point) return { a = point.a, again = require('lib').value } end }
+-- file: lib.lua
+return { value = 7 }

@@ -28,3 +28,17 @@ softvt.soft { density = 200, youngs_pa = -1, poisson = 0.3 }
 softvt.soft { density = 200, youngs_pa = 1e4, poisson = 0.5 }
 
 softvt.asset { name = 'a', shape = ball, body = softvt.static {}, friction = { static_mu = 0.1 } }
+
+assert(math.abs(softvt.shape.box { size = { 0.1, 0.04, 0.03 } }:volume() - 1.2e-4) < 1e-15)
+assert(math.abs(softvt.shape.sphere { radius = 0.03 }:grounded():volume() - 4 / 3 * math.pi * 0.03 ^ 3) < 1e-12)
+error('volumes of closed forms', 0)
+
+-- A reference is made once for an object, and for other materials than those of its text alone.
+local sphere, text = require 'assets.sphere', softvt.calibration('sphere').json
+local function ball(youngs, resolution)
+  return softvt.asset { name = 'sphere', shape = sphere.shape, body = softvt.soft {
+    youngs_pa = youngs, poisson = 0.3, density = 300, resolution = resolution } }
+end
+local soft, fine = softvt.draw_reference(ball(5e3, 6), text), softvt.draw_reference(ball(5e3, 7), text)
+assert(not softvt.draw_reference(sphere, text) and soft and soft == fine)
+error('made once', 0)

@@ -3,7 +3,9 @@ local small = require 'small'
 return small.suite { shifts = { softvt.shift { name = 'stiffness', default = 1, min = 0.1, apply = function(scene, value) ... end } } }
 ---
 -- shift: stiffness=0.5
-local o = scene:object 'ball' o.youngs_pa = o.youngs_pa * value return scene
+local ball = scene:object 'ball'
+ball.youngs_pa = ball.youngs_pa * value
+assert(ball.youngs_pa == 20e3)
 
 -- shift: stifness=0.5
 return scene

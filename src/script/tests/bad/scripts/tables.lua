@@ -68,3 +68,7 @@ softvt.plot { title = 'a', x = { label = 'x' }, y = { label = 'y' }, series = { 
 local s = softvt.plot { title = 'a', x = { label = 'x' }, y = { label = 'y', log = true },
   series = { { label = 'one', points = { { 0, 1 }, { 1, 10 } } } }, levels = { { y = 5, label = 'limit' } } }
 error(s:sub(1, 4) .. tostring(s:find('limit', 1, true) ~= nil), 0)
+
+local calibration = softvt.calibration 'sphere'
+assert(calibration.window.extent_mm > 1 and calibration.tau > 0 and softvt.calibration 'nothing_like_it' == nil)
+error('read', 0)
