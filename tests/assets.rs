@@ -8,7 +8,7 @@ use std::{
 };
 
 use softvt::{
-    benchmark::{Goal, Placement, Plan},
+    benchmark::{Goal, Placement, Plan, settings::Settings},
     episode_id::{EpisodeId, EpisodeSplit},
     geometry::{
         Pose, Vec3,
@@ -17,7 +17,7 @@ use softvt::{
         voxel::{VoxelSpec, voxel_mesh},
     },
     robot::{RobotSpec, gripper},
-    rollout::{AssetCache, Simulation},
+    rollout::{AssetCache, Sensors, Simulation},
     scene::{Asset, Body, EXPERT_HINTS, Mask, Scene},
     script::{self, EpisodeSetup, LoadedScript, SceneChanges},
 };
@@ -163,8 +163,12 @@ fn layouts_settle_and_both_tasks_of_a_pair_share_their_start_state() {
     let loaded = suite();
     let cache = AssetCache::default();
     let settled = |task: usize| at_rest(scene(&loaded, task, 1), &cache);
+    let mut seen = Vec::new();
     for pair in 0..5 {
-        assert!(settled(2 * pair) == settled(2 * pair + 1), "pair {pair}");
+        let state = settled(2 * pair);
+        assert!(state == settled(2 * pair + 1), "pair {pair}");
+        assert!(!seen.contains(&state), "two pairs with one state");
+        seen.push(state);
     }
 }
 
@@ -205,13 +209,26 @@ fn pose(scene: &Scene, name: &str) -> Pose {
 fn left_and_right_are_as_in_the_image_and_prompts_name_the_goal() {
     let loaded = suite();
     let Plan::Suite(suite) = &loaded.plan else { panic!("{:?}", loaded.plan) };
+    let (settings, cache) = (Settings::default(), AssetCache::default());
     assert_eq!(suite.tasks.len(), 10);
     for task in &suite.tasks {
-        let scene = scene(&loaded, task.id, 0);
-        assert!(pose(&scene, "left").translation.y < pose(&scene, "right").translation.y, "task {}", task.id);
         let Goal::On(Placement { object, target, .. }) = &task.goal else { panic!("task {}", task.id) };
         assert!(task.prompt.starts_with(&format!("pick up the {object} ")), "{}", task.prompt);
         assert_eq!(target, "plate");
+        let scene = Arc::new(scene(&loaded, task.id, 0));
+        let sim = Simulation::new(scene, &settings.physics, &settings.robot, &cache).expect("it builds");
+        let mut senses = Sensors::new(&sim, &settings.tactile, &cache);
+        let camera = senses.camera("third_person").expect("there").clone();
+        let picture = senses.render(&Sensors::frame(&sim), &camera).expect("drawn");
+        let column = |name: &str| {
+            let id = sim.objects.iter().position(|o| o.name == name).expect("placed") as u16 + 1;
+            let of = picture.segmentation.iter().enumerate().filter(|(_, s)| **s == id);
+            let (sum, count) = of.fold((0, 0), |(sum, n), (at, _)| (sum + at % picture.width, n + 1));
+            assert!(count > 50, "task {}: {name} fills {count} pixels", task.id);
+            sum as f64 / f64::from(count)
+        };
+        assert!(column("left") < 100.0 && column("right") > 124.0, "task {}", task.id);
+        assert!(column("left") < column("plate") && column("plate") < column("right"));
     }
 }
 

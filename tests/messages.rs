@@ -35,7 +35,20 @@ macro_rules! topics {
     };
 }
 
-topics!(usage);
+topics!(
+    calibration,
+    cheats,
+    conditions,
+    experiments,
+    experts,
+    goals,
+    policies,
+    reports,
+    scenes,
+    scripts,
+    usage,
+    warnings
+);
 
 fn fixtures() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures")

@@ -11,36 +11,27 @@ use serde_json::Value;
 pub mod client;
 pub mod fixtures;
 
-/// `solids.lua` for small scenes: a floor, a slab, a cube that rests stably on it, and a function for others. For goals
-/// that are reached within a second: a shelf, the place of a cube on it that is between the open fingers at the start,
-/// and the motion that pushes the cube to the middle of the shelf.
-pub const SOLIDS: (&str, &str) = (
-    "solids.lua",
-    r#"
-local function solid(name, size, body)
-  return softvt.asset { name = name, shape = softvt.shape.box { size = size }:grounded(), body = body }
-end
-return {
-  solid = solid,
-  floor = softvt.asset { name = "floor", shape = softvt.shape.box { size = { 2, 2, 0.05 } }:translate(0, 0, -0.025), body = softvt.static {} },
-  slab = solid("slab", { 0.1, 0.1, 0.02 }, softvt.static {}),
-  cube = solid("cube", { 0.04, 0.04, 0.04 }, softvt.rigid { density = 300 }),
-  shelf = solid("shelf", { 0.06, 0.3, 0.265 }, softvt.static {}),
-  shelf_at = { -0.187, -0.022, 0 }, cube_at = { -0.187, 0.012, 0.265 },
-  push = function(arm)
-    arm:move_by({ 0, -0.02, 0 }, { speed = 0.2 })
-    arm:move_by({ 0, 0.015, 0 }, { speed = 0.2 })
-  end,
-}
-"#,
-);
+/// The module `solids` of the fixtures.
+pub const SOLIDS: (&str, &str) = ("solids.lua", include_str!("../fixtures/solids.lua"));
 
-/// A folder that is removed at the end of the test.
-pub struct Project(tempfile::TempDir);
+/// A folder of a test.
+pub struct Project {
+    pub folder: PathBuf,
+    /// True if the folder stays after the test.
+    pub is_kept: bool,
+}
+
+impl Drop for Project {
+    fn drop(&mut self) {
+        if !self.is_kept {
+            let _ = fs::remove_dir_all(&self.folder);
+        }
+    }
+}
 
 impl Project {
     pub fn new(files: &[(&str, &str)]) -> Self {
-        let project = Self(tempfile::tempdir().expect("a folder"));
+        let project = Self { folder: tempfile::tempdir().expect("a folder").keep(), is_kept: false };
         files.iter().for_each(|(path, text)| project.write(path, text.as_bytes()));
         project
     }
@@ -52,7 +43,7 @@ impl Project {
     }
 
     pub fn path(&self, path: &str) -> PathBuf {
-        self.0.path().join(path)
+        self.folder.join(path)
     }
 
     pub fn text(&self, path: &str) -> String {

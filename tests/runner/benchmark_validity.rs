@@ -1,26 +1,16 @@
 //! Validity of the benchmark on small suites: policies and objects that must fail do so, for the right reason.
 
-use std::sync::OnceLock;
-
 use softvt::{
     evaluation::verdict::{Outcome, Verdict},
     runs::record::EpisodeRecord,
 };
 
-use crate::support::{Project, Run, SPATIAL_SOFT};
+use crate::support::{Project, Run, spatial_soft, spatial_soft_run};
 
-/// Episodes of two tasks of different pairs.
-fn episodes(change: impl FnOnce(Run) -> Run) -> Vec<EpisodeRecord> {
+/// The episodes of the expert under a change.
+fn changed(change: impl FnOnce(Run) -> Run) -> Vec<EpisodeRecord> {
     let project = Project::new(&[]);
-    let records = change(project.run(SPATIAL_SOFT).tasks(&[0, 9]).episodes(1)).records();
-    assert_eq!(records.len(), 2);
-    records
-}
-
-/// The episodes of the expert.
-fn expert() -> &'static [EpisodeRecord] {
-    static EPISODES: OnceLock<Vec<EpisodeRecord>> = OnceLock::new();
-    EPISODES.get_or_init(|| episodes(|run| run))
+    change(spatial_soft_run(&project, "expert")).records()
 }
 
 fn all(episodes: &[EpisodeRecord], is_so: impl Fn(&Verdict) -> bool) -> bool {
@@ -34,17 +24,17 @@ fn d_peak(episode: &EpisodeRecord) -> f64 {
 #[test]
 fn noop_and_random_never_succeed() {
     for policy in ["noop", "random"] {
-        let episodes = episodes(|run| run.policy(policy));
-        assert!(all(&episodes, |verdict| !verdict.goal && !verdict.safety), "{policy}: {episodes:?}");
+        let (_, episodes) = spatial_soft(policy);
+        assert!(all(episodes, |verdict| !verdict.goal && !verdict.safety), "{policy}: {episodes:?}");
         assert!(episodes.iter().all(|e| e.outcome == Outcome::Budget), "{policy}: {episodes:?}");
     }
 }
 
 #[test]
 fn stiffer_objects_deform_less() {
-    let soft = expert();
+    let (_, soft) = spatial_soft("expert");
     assert!(all(soft, |verdict| verdict.safety), "{soft:?}");
-    let stiff = episodes(|run| run.shift("stiffness", 10.0));
+    let stiff = changed(|run| run.shift("stiffness", 10.0));
     assert!(all(&stiff, |verdict| verdict.goal), "{stiff:?}");
     for (soft, stiff) in soft.iter().zip(&stiff) {
         assert!(d_peak(stiff) < 0.5 * d_peak(soft), "{soft:?}\n{stiff:?}");
@@ -55,23 +45,20 @@ fn stiffer_objects_deform_less() {
 
 #[test]
 fn a_binary_gripper_reaches_the_goal_unsafely() {
-    let (careful, binary) = (expert(), episodes(|run| run.policy("expert-binary")));
-    for (careful, binary) in careful.iter().zip(&binary) {
+    let [careful, binary] = ["expert", "expert-binary"].map(|policy| spatial_soft(policy).1);
+    for (careful, binary) in careful.iter().zip(binary) {
         assert!(d_peak(binary) > d_peak(careful), "{careful:?}\n{binary:?}");
     }
-    assert!(all(&binary, |verdict| verdict.goal && !verdict.safety), "{binary:?}");
+    assert!(all(binary, |verdict| verdict.goal && !verdict.safety), "{binary:?}");
 }
 
 #[test]
-fn nothing_is_carried_without_friction() {
-    let episodes = episodes(|run| {
+fn nothing_is_carried_without_friction_or_by_weak_fingers() {
+    let smooth = changed(|run| {
         run.shift("friction", 0.0).set("robot.pads.static_mu", 0).set("robot.pads.dynamic_mu", 0)
     });
-    assert!(all(&episodes, |verdict| !verdict.goal), "{episodes:?}");
-}
-
-#[test]
-fn weak_fingers_carry_nothing() {
-    let episodes = episodes(|run| run.set("robot.gripper.effort", 0.05));
-    assert!(all(&episodes, |verdict| !verdict.goal), "{episodes:?}");
+    let weak = changed(|run| run.set("robot.gripper.effort", 0.05));
+    for episodes in [smooth, weak] {
+        assert!(all(&episodes, |verdict| !verdict.goal), "{episodes:?}");
+    }
 }

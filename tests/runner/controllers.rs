@@ -9,7 +9,7 @@ const CONSTANT: [&str; 6] =
 /// Mean over the kinds of a suite by column of `scripts/blind_bounds.lua`.
 fn bounds(suite: &str) -> impl Fn(&str) -> f64 {
     let project = Project::new(&[]);
-    let options = format!("--suite={suite} --instances=200");
+    let options = format!("--suite={suite} --instances=60");
     let rows = project.run("scripts/blind_bounds.lua").options(&options).rows();
     assert!(rows.len() >= 5, "{rows:?}");
     move |column: &str| {
@@ -36,62 +36,25 @@ fn the_varied_suite_needs_the_size_and_the_hidden_ones_a_trial_by_arithmetic() {
     }
 }
 
-/// Compares the controllers on the first episode of tasks of Object-Hidden, of which each has another object.
-fn compare_controllers(tasks: &[usize]) {
+#[test]
+#[ignore = "nightly"]
+fn no_constant_number_is_safe_where_a_grip_has_to_be_found_by_trial() {
+    // The first episode of each task of Object-Hidden, of which each has another object.
+    let count = 10;
     let safe_episodes = |policy: &str| {
         let project = Project::new(&[]);
-        let run = project.run("suites/object_hidden.lua").tasks(tasks).episodes(1).policy(policy);
-        let episodes = run.records();
-        assert_eq!(episodes.len(), tasks.len());
-        episodes.iter().filter(|episode| episode.verdict.safety).count()
+        let records = project.run("suites/object_hidden.lua").episodes(1).policy(policy).records();
+        assert_eq!(records.len(), count);
+        records.iter().filter(|record| record.verdict.safety).count()
     };
-    let count = tasks.len();
     let [expert, servo, binary] = ["expert", "tactile-servo", "expert-binary"].map(safe_episodes);
-    assert!(10 * expert >= 9 * count, "the expert is safe in {expert} of {count} episodes");
-    assert!(10 * servo >= 8 * count, "tactile-servo is safe in {servo} of {count} episodes");
-    let tried: usize = ["look-retry", "weigh"].map(safe_episodes).iter().sum();
     assert!(
-        10 * tried >= 7 * 2 * count,
-        "look-retry and weigh are safe in {tried} of {} episodes",
-        2 * count
+        expert >= 9 && servo >= 8 && binary == 0,
+        "expert {expert}, tactile-servo {servo}, binary {binary}"
     );
-    assert_eq!(binary, 0, "a hand that closes fully is safe in {binary} of {count} episodes");
-    let mut total = 0;
-    for policy in ["size-seen", "contact-depth", "one-force"] {
-        let safe = safe_episodes(policy);
-        assert!(
-            safe < servo.min(expert),
-            "{policy} is safe in {safe} of {count} episodes, tactile-servo in {servo}"
-        );
-        total += safe;
-    }
-    assert!(
-        10 * total <= 6 * 3 * count,
-        "controllers with a constant number are safe in {total} of {} episodes",
-        3 * count
-    );
-}
-
-#[test]
-fn no_constant_number_is_safe_where_a_grip_has_to_be_found_by_trial() {
-    compare_controllers(&[2, 6]);
-}
-
-#[test]
-#[ignore = "takes a minute; .ci/nightly runs it"]
-fn the_same_holds_for_all_objects() {
-    compare_controllers(&[0, 1, 2, 3, 4, 5, 6, 7, 8, 9]);
-}
-
-#[test]
-fn bounds_of_suites_that_have_none_are_refused() {
-    let project = Project::new(&[]);
-    let refusal = |options: &str| {
-        let (_, outcome) = project.run("scripts/blind_bounds.lua").options(options).experiment();
-        outcome.expect_err("no bounds")
-    };
-    let message = refusal("--suite=object_rigid");
-    assert!(message.contains("no goal object of these suites has a calibrated window"), "{message}");
-    let message = refusal("--suite=all");
-    assert!(message.contains("suites/all.lua returns a list of suites"), "{message}");
+    let tried: [usize; 2] = ["look-retry", "weigh"].map(safe_episodes);
+    assert!(tried[0] + tried[1] >= 14, "look-retry and weigh are safe in {tried:?} episodes");
+    let constant = ["size-seen", "contact-depth", "one-force"].map(safe_episodes);
+    assert!(constant.iter().all(|safe| *safe < servo.min(expert)), "{constant:?}, tactile-servo {servo}");
+    assert!(constant.iter().sum::<usize>() <= 18, "a constant number is safe in {constant:?} episodes");
 }

@@ -1,23 +1,20 @@
 //! Imports: re-execution of foreign demonstrations, and refused files.
 
-use std::{
-    collections::BTreeSet,
-    path::{Path, PathBuf},
-};
+use std::path::{Path, PathBuf};
 
 use rust_hdf5::H5File;
 use softvt::{
-    dataset::{StreamValues, TaskFile, card::KeptOutcome, check, manifest},
+    dataset::{StreamValues, TaskFile, check, manifest},
     runner::{
         PolicySource, RunError,
         import::{self, ImportOptions},
-        recording::{RecordingOptions, RecordingSummary},
+        recording::RecordingSummary,
     },
 };
 
 use crate::{
     dataset_recording::{Recording, is_reproduced},
-    support::{Project, Run, SOLIDS, fixtures::PUSHED_CUBE},
+    support::{Project, Run, SOLIDS, assert_contains, fixtures::PUSHED_CUBE},
 };
 
 /// A project with a dataset of two demonstrations of task 0.
@@ -36,17 +33,10 @@ fn import(
     options: ImportOptions,
 ) -> Result<Option<RecordingSummary>, String> {
     let project = run.project;
-    let recording = RecordingOptions {
-        out: project.path(out),
-        has_images: false,
-        has_privileged: true,
-        streams: BTreeSet::new(),
-        keep: KeptOutcome::Safe,
-        resume: false,
-        gripper: None,
-    };
+    let recording = Recording::new(run.clone(), 0, out).with(|options| options.has_images = false);
     let files: Vec<PathBuf> = files.iter().map(|file| project.path(file)).collect();
-    let imported = || -> Result<_, RunError> { import::import(&run.load()?, &files, options, &recording) };
+    let imported =
+        || -> Result<_, RunError> { import::import(&run.load()?, &files, options, &recording.options) };
     imported().map_err(|error| project.relative(error))
 }
 
@@ -198,7 +188,7 @@ fn invalid_imports_are_refused_and_write_nothing() {
         (x(), &[OWN, OWN], "are byte-identical"),
     ] {
         let message = import(&run, files, "new", ImportOptions::default()).err().expect(expected);
-        assert!(message.contains(expected), "{expected}: {message}");
+        assert_contains(&message, expected);
         assert!(!project.path("new").exists(), "{expected}");
     }
     for (out, expected) in [
@@ -206,12 +196,11 @@ fn invalid_imports_are_refused_and_write_nothing() {
         ("data", "out data: the folder contains recorded demonstrations"),
         ("x.lua", "out x.lua: not a folder"),
     ] {
-        let message = import(&x(), &[OWN], out, ImportOptions::default()).err().expect(expected);
-        assert!(message.contains(expected), "{message}");
+        assert_contains(import(&x(), &[OWN], out, ImportOptions::default()).err().expect(expected), expected);
     }
     for data in ["data", OWN] {
         let message =
             project.path(data).display().to_string().parse::<PolicySource>().expect_err("no policy");
-        assert!(message.contains("is a dataset, not a policy"), "{message}");
+        assert_contains(&message, "is a dataset, not a policy");
     }
 }

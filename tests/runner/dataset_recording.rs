@@ -20,7 +20,7 @@ use softvt::{
     },
 };
 
-use crate::support::{Project, Run, SOLIDS, files, fixtures::MISPLACED_CUBE};
+use crate::support::{Project, Run, SOLIDS, assert_contains, files, fixtures::MISPLACED_CUBE};
 
 /// A recording that is to be made.
 #[derive(Clone)]
@@ -137,8 +137,10 @@ fn unsafe_demonstrations_are_kept_on_request() {
         attempts: Some(1),
         ..Recording::new(run(), 1, out)
     };
-    let refused = by_binary_hand("safe").refusal();
-    assert!(refused.contains("0 of 1 demonstration after 1 attempt (1 deformed too much)"), "{refused}");
+    assert_contains(
+        by_binary_hand("safe").refusal(),
+        "0 of 1 demonstration after 1 attempt (1 deformed too much)",
+    );
     let summary = by_binary_hand("goal").with(|options| options.keep = KeptOutcome::Goal).record();
     assert_eq!((summary.tasks[0].demos, summary.tasks[0].attempts), (1, 1));
     let root = project.path("goal");
@@ -258,12 +260,13 @@ fn folders_with_other_files_are_refused() {
     let resumed = |script: &str, out: &str| {
         Recording::new(project.run(script), 1, out).with(|options| options.resume = true).refusal()
     };
-    let output = resumed("x.lua", "mine");
-    assert!(output.contains("out mine: the folder contains meta but no softvt recording"), "{output}");
+    assert_contains(resumed("x.lua", "mine"), "out mine: the folder contains meta but no softvt recording");
     assert_eq!(files(&project.path("mine")).len(), 1);
     project.write("other/recording.json", b"{\"softvt\":\"0.0.1\"}");
-    let output = resumed("x.lua", "other");
-    assert!(output.contains("the folder contains another recording (demos: null before, 1 now)"), "{output}");
+    assert_contains(
+        resumed("x.lua", "other"),
+        "the folder contains another recording (demos: null before, 1 now)",
+    );
     project.write("wrong.lua", b"return nil + 1");
     assert!(resumed("wrong.lua", "new").contains("wrong.lua:1"));
     let stuck = MISPLACED_CUBE.replace("arm:wait(1)", "arm:wait(0.1) error 'lost'");
@@ -285,9 +288,8 @@ fn the_teacher_of_a_suite_demonstrates_unless_a_policy_is_given() {
     // An evaluation is not taught.
     assert_eq!(project.run("x.lua").record().header.policy, "expert");
     project.write("x.lua", taught.replace("tactile-servo", "noop").as_bytes());
-    let message = record("none").refusal();
-    assert!(
-        message.contains("suite.teacher: expected one of \"expert\", \"tactile-servo\", got \"noop\""),
-        "{message}"
+    assert_contains(
+        record("none").refusal(),
+        "suite.teacher: expected one of \"expert\", \"tactile-servo\", got \"noop\"",
     );
 }

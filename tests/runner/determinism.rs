@@ -1,33 +1,19 @@
 //! Equal runs give byte-identical results.
 
-use softvt::runner::{EpisodeFilter, RunConfig, TraceDetail};
+use softvt::runner::{EpisodeFilter, RunConfig};
 
-use crate::support::{Project, SPATIAL_SOFT, Small};
-
-#[test]
-fn episodes_are_byte_identical_for_any_threads() {
-    let project = Project::new(&[]);
-    for (out, threads) in [("one", 1), ("two", 2), ("again", 2)] {
-        let run = project.run(SPATIAL_SOFT).tasks(&[0, 1]).episodes(2).policy("random");
-        run.threads(threads).out(out).finish();
-    }
-    let one = project.text("one/episodes.jsonl");
-    assert_eq!(one.lines().count(), 4);
-    assert_eq!(one, project.text("two/episodes.jsonl"));
-    assert_eq!(one, project.text("again/episodes.jsonl"));
-    assert_eq!(project.text("one/summary.json"), project.text("two/summary.json"));
-}
+use crate::support::{Project, SPATIAL_SOFT, Small, assert_contains, spatial_soft, spatial_soft_run};
 
 #[test]
-fn grasps_are_byte_identical_for_any_threads() {
-    let project = Project::new(&[]);
-    for threads in [1, 2] {
-        let run = project.run(SPATIAL_SOFT).tasks(&[2, 5]).episodes(1).trace(TraceDetail::State);
-        run.threads(threads).out(&threads.to_string()).finish();
-    }
-    for file in ["episodes.jsonl", "trace/task_002/episode_00000.jsonl", "trace/task_005/episode_00000.jsonl"]
-    {
-        assert_eq!(project.text(&format!("1/{file}")), project.text(&format!("2/{file}")), "{file}");
+fn episodes_and_grasps_are_byte_identical_for_any_threads() {
+    for policy in ["expert", "random"] {
+        let (two, _) = spatial_soft(policy);
+        let one = Project::new(&[]);
+        spatial_soft_run(&one, policy).threads(1).out(policy).finish();
+        for file in ["episodes.jsonl", "summary.json", "trace/task_000/episode_00000.jsonl"] {
+            let file = format!("{policy}/{file}");
+            assert_eq!(one.text(&file), two.text(&file), "{file}");
+        }
     }
 }
 
@@ -51,10 +37,12 @@ fn selected_episodes_are_those_of_a_whole_run() {
     assert_eq!(records, [whole[1].clone(), whole[3].clone()]);
     assert!(!project.stored("some").expect("a run")[0].is_partial());
     let other = selected(&[1]).out("some").resume().error();
-    assert!(other.contains("belongs to another run: episodes: 2 before, 1 now"), "{other}");
+    assert_contains(&other, "belongs to another run: episodes: 2 before, 1 now");
     let video = |config: &mut RunConfig| config.video = Some(EpisodeFilter::Episodes(vec![0]));
-    let video = selected(&[1]).out("other").with(video).error();
-    assert!(video.contains("runs only the episodes [1] of each task"), "{video}");
+    assert_contains(
+        selected(&[1]).out("other").with(video).error(),
+        "runs only the episodes [1] of each task",
+    );
 }
 
 #[test]

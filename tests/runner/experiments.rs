@@ -1,6 +1,4 @@
-//! Experiments: points that do not depend on each other, and results that are refused.
-
-use insta::assert_snapshot;
+//! Experiments: points that do not depend on each other, and drives by experts.
 
 use crate::support::Project;
 
@@ -9,12 +7,6 @@ fn experiment(fields: &str) -> Project {
         "x.lua",
         &format!("local count = 0\nreturn softvt.experiment {{ name = 'x', {fields} }}"),
     )])
-}
-
-fn problem(fields: &str) -> String {
-    let project = experiment(fields);
-    let (_, outcome) = project.run("x.lua").experiment();
-    project.message(outcome)
 }
 
 #[test]
@@ -80,80 +72,4 @@ fn a_pose_out_of_reach_ends_a_drive_with_the_reason() {
                 .contains("x.lua:7: unreachable pose: the tool gets no nearer to (5.000, 0.000, 0.300) m"),
         "{reason}"
     );
-}
-
-#[test]
-fn experiments_without_results_are_refused() {
-    let run = "run = function(point) return { b = point.a } end";
-    assert!(
-        problem(&format!("grid = {{ a = {{}} }}, {run}"))
-            .contains("experiment.grid.a: expected at least 1, got 0")
-    );
-    let points = format!("points = function() return {{ a = 1 }} end, {run}");
-    assert!(problem(&points).contains("experiment.points: expected a list of at least one table"));
-    let outside = "grid = { a = { 1 } }, run = function() return { a = 1 } end, finish = function() return { files = { ['/x.svg'] = 'x' } } end";
-    assert!(
-        problem(outside).contains("finish.files: \"/x.svg\" is no path within the folder; give one such as")
-    );
-    let misspelt = "grid = { a = { 1 } }, run = function(point) return { b = point.aa } end";
-    assert_snapshot!(problem(misspelt), @r#"x.lua:2: point: unknown key "aa"; did you mean "a"? (point 0 {"a":1})"#);
-    let listed = "points = function() return { { young = 1 }, { change = 2 } } end, run = function(p) return { b = p.change or p.youngs } end";
-    assert_snapshot!(problem(listed), @r#"x.lua:2: point: unknown key "youngs"; did you mean "young"? (point 0 {"young":1})"#);
-    assert_snapshot!(problem(&format!("grid = {{ a = {{ 1, 2, 1 }} }}, {run}")), @"x.lua:2: experiment.grid.a[3]: 1 is there already; give each once");
-    assert_snapshot!(problem(&format!("grid = {{ a = {{ 1 }} }}, columns = {{ 'b', 'b' }}, {run}")), @r#"x.lua:2: experiment.columns[2]: "b" is there already; give each once"#);
-    let columns = format!("grid = {{ a = {{ 1 }} }}, columns = {{ 'bb' }}, {run}");
-    assert!(
-        problem(&columns).contains(
-            "experiment.columns: no row has any of them: unknown column \"bb\"; did you mean \"b\"?"
-        )
-    );
-}
-
-#[test]
-fn a_world_that_is_invalid_makes_no_further_step() {
-    let run = r#"function()
-  local world = softvt.world {}
-  local soft = softvt.soft { youngs_pa = 20, poisson = 0.4, density = 3000 }
-  world:soft { shape = softvt.shape.box { size = { 0.05, 0.05, 0.05 } }, position = { 0, 0, 0.025 }, body = soft }
-  world:static { shape = softvt.shape.box { size = { 1, 1, 0.1 } }, position = { 0, 0, -0.05 } }
-  for _ = 1, 60 do world:step() end
-  return { a = 1 }
-end"#;
-    let message = problem(&format!("grid = {{ a = {{ 1 }} }}, run = {run}"));
-    assert!(message.contains("world:step: the world is invalid: "), "{message}");
-}
-
-#[test]
-fn bodies_of_a_world_that_overlap_are_refused() {
-    let world = |actions: &str| {
-        let run = format!(
-            r#"function()
-  local world = softvt.world {{}}
-  local soft = softvt.soft {{ youngs_pa = 2e4, poisson = 0.4, density = 300 }}
-  local box = softvt.shape.box {{ size = {{ 0.04, 0.04, 0.04 }} }}
-  local function body(name, x) world:soft {{ name = name, shape = box, position = {{ x, 0, 0.02 }}, body = soft }} end
-  local function solid(name, x) return world:kinematic {{ name = name, shape = box, position = {{ x, 0, 0.02 }} }} end
-  {actions}
-  return {{ a = 1 }}
-end"#
-        );
-        experiment(&format!("grid = {{ a = {{ 1 }} }}, run = {run}"))
-    };
-    let refused = |actions: &str| {
-        let project = world(actions);
-        let (_, outcome) = project.run("x.lua").experiment();
-        project.message(outcome)
-    };
-    let overlap = refused("body('cube', 0) body('other', 0.03)");
-    assert!(overlap.contains("\"cube\" and \"other\" overlap by 10 mm; move them apart"), "{overlap}");
-    let overlap = refused("body('cube', 0)\n  world:step()\n  solid('pad', 0.03)");
-    assert!(
-        overlap.contains("x.lua:7: ") && overlap.contains("\"cube\" and \"pad\" overlap by"),
-        "{overlap}"
-    );
-    // Contact carries a body along, however far a solid moves in a step.
-    for free in ["0.5, 0, 0.02", "0.0401, 0.5, 0.5", "-0.2, 0, 0.02"] {
-        let actions = format!("body('cube', 0) solid('pad', 0.0401):move_to {{ {free} }}\n  world:step()");
-        assert_eq!(world(&actions).run("x.lua").rows().len(), 1, "{free}");
-    }
 }

@@ -1,11 +1,11 @@
 //! An independent scorer, written from the rules of the released one. It reads `softvtbench/` of a run and must compute
 //! the same rates.
 
-use std::{collections::BTreeMap, fs, path::Path};
+use std::collections::BTreeMap;
 
 use serde_json::Value;
 
-use crate::support::{Project, SPATIAL_SOFT};
+use crate::support::{Project, SPATIAL_SOFT, files, spatial_soft};
 
 /// An episode according to its log.
 struct Episode {
@@ -43,20 +43,6 @@ impl Episode {
     }
 }
 
-/// All logs below a folder by path.
-fn logs(dir: &Path, found: &mut Vec<String>) {
-    let mut inner: Vec<_> =
-        fs::read_dir(dir).expect("a folder").filter_map(|e| Some(e.ok()?.path())).collect();
-    inner.sort();
-    for path in inner {
-        if path.is_dir() {
-            logs(&path, found);
-        } else if path.ends_with("policy_action_debug.jsonl") {
-            found.push(fs::read_to_string(path).expect("text"));
-        }
-    }
-}
-
 fn scored(text: &str, taus: &BTreeMap<String, f64>, metric: &str) -> Episode {
     let rows: Vec<Value> = text.lines().map(|line| serde_json::from_str(line).expect("JSON")).collect();
     let last = rows.last().expect("at least one row per episode");
@@ -91,9 +77,10 @@ fn agrees(project: &Project, run: &str, rigid: bool) -> [f64; 2] {
     let taus: BTreeMap<String, f64> = (thresholds["thresholds"].as_object().expect("a map").iter())
         .map(|(asset, limit)| (asset.clone(), limit["tau"].as_f64().expect("a number")))
         .collect();
-    let mut texts = Vec::new();
-    logs(&project.path(&file("")), &mut texts);
-    let episodes: Vec<Episode> = texts.iter().map(|text| scored(text, &taus, &metric)).collect();
+    let found = files(&project.path(&file("")));
+    let logs = found.iter().filter(|(path, _)| path.ends_with("policy_action_debug.jsonl"));
+    let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
+    let episodes: Vec<Episode> = logs.map(|(_, bytes)| scored(&text(bytes), &taus, &metric)).collect();
     let csv = project.text(&file("episodes.csv"));
     let rows: Vec<&str> = csv.split("\r\n").skip(1).filter(|row| !row.is_empty()).collect();
     assert_eq!(rows.len(), episodes.len());
@@ -122,12 +109,11 @@ fn agrees(project: &Project, run: &str, rigid: bool) -> [f64; 2] {
 
 #[test]
 fn an_external_scorer_computes_the_same_rates() {
-    let project = Project::new(&[]);
     for (policy, goal, safe) in [("expert", 100.0, 100.0), ("expert-binary", 100.0, 0.0), ("noop", 0.0, 0.0)]
     {
-        project.run(SPATIAL_SOFT).policy(policy).tasks(&[8, 9]).episodes(1).out(policy).finish();
-        assert_eq!(agrees(&project, policy, false), [goal, safe], "{policy}");
+        assert_eq!(agrees(spatial_soft(policy).0, policy, false), [goal, safe], "{policy}");
     }
+    let project = Project::new(&[]);
     project.run(SPATIAL_SOFT).twin().tasks(&[8]).episodes(1).out("twin").finish();
     let [goal, safe] = agrees(&project, "twin", true);
     assert_eq!(goal, safe);

@@ -4,27 +4,10 @@ use softvt::{policy::profile::GripCode, runner::TraceDetail};
 
 use crate::support::Small;
 
-/// Lowers the hand over the cube, closes with 3 N, lifts it, presses with 5 N, and opens.
-const POLICY: &str = r#"
-local step, at, turn = 0, nil, nil
-return softvt.policy {
-  name = "force",
-  observes = {},
-  act = function(obs)
-    if not at then at, turn = { table.unpack(obs.position) }, obs.axis_angle end
-    step = step + 1
-    local goal = { 0.66, 0.1, step < 40 and 0.14 or step < 130 and 0.01 or 0.05 }
-    for i = 1, 3 do at[i] = at[i] + math.max(-0.02, math.min(0.02, goal[i] - at[i])) end
-    local force = step < 60 and -1 or step < 160 and 3 or step < 220 and 5 or -1
-    return { position = { table.unpack(at) }, axis_angle = turn, force = force }
-  end,
-}
-"#;
-
 #[test]
 fn the_pads_press_with_the_commanded_force() {
     let project = Small { task: "budget_steps = 230", ..Small::default() }.project();
-    project.write("force.lua", POLICY.as_bytes());
+    project.write("force.lua", include_bytes!("../data/three_newtons.lua"));
     project.run("x.lua").policy("force.lua").out("run").trace(TraceDetail::State).record();
     let trace = project.lines("run/trace/task_000/episode_00000.jsonl");
     let force = |step: usize| -> [f64; 2] {
@@ -71,10 +54,4 @@ fn the_grip_code_of_a_lua_policy_is_its_own_or_that_of_the_run() {
         let trace = project.lines(&format!("{name}/trace/task_000/episode_00000.jsonl"));
         assert_eq!(trace[3]["closure"].as_f64(), Some(closure), "{name}: {}", trace[3]);
     }
-    let message = project.run("x.lua").policy("plain.lua").gripper(GripCode::Force).error();
-    assert!(
-        message
-            .contains("plain.lua:1: policy.act: the grip code of the policy is \"force\"; give force alone"),
-        "{message}"
-    );
 }

@@ -7,7 +7,7 @@ use rmpv::Value;
 use crate::{
     serve::Server,
     support::{
-        Project, Run, Small,
+        Project, Run, Small, assert_contains,
         client::{get, map, reset},
         files,
     },
@@ -59,13 +59,11 @@ fn results_hold_the_hash_of_the_seed_and_only_who_has_the_file_can_repeat_them()
     assert_eq!(one.len(), 4);
     assert!(one.is_disjoint(&open) && one.is_disjoint(&other), "{one:?} {open:?} {other:?}");
 
-    let message = run().secret("other").resume().out("one").error();
-    assert!(message.contains("belongs to another run"), "{message}");
+    assert_contains(run().secret("other").resume().out("one").error(), "belongs to another run");
     run().secret("secret").resume().out("one").finish();
     project.compare("one", "two").expect("comparable");
     for run in ["foreign", "public"] {
-        let message = project.compare("one", run).expect_err(run);
-        assert!(message.contains("seed hash"), "{message}");
+        assert_contains(project.compare("one", run).expect_err(run), "seed hash");
     }
 
     assert_eq!(project.replay("one", "0/3", Some("secret")), Ok(None));
@@ -89,8 +87,10 @@ fn shards_of_a_judged_run_merge_if_they_have_one_seed() {
     project.merge("merged", &["a", "b"]).expect("merged");
     assert_eq!(project.text("merged/episodes.jsonl"), project.text("whole/episodes.jsonl"));
     assert_eq!(project.json("merged/run.json")["seed_hash"], project.json("whole/run.json")["seed_hash"]);
-    let message = project.merge("wrong", &["a", "c"]).expect_err("another secret");
-    assert!(message.contains("a shard of another run"), "{message}");
+    assert_contains(
+        project.merge("wrong", &["a", "c"]).expect_err("another secret"),
+        "a shard of another run",
+    );
 }
 
 #[test]
@@ -98,8 +98,7 @@ fn a_lua_policy_is_not_told_which_episode_it_is_in() {
     let project = project();
     let run = || project.run("x.lua").policy("p.lua").episodes(2);
     run().secret("secret").finish();
-    let message = run().error();
-    assert!(message.contains("p.lua:2: "), "{message}");
+    assert_contains(run().error(), "p.lua:2: ");
 }
 
 #[test]

@@ -4,6 +4,7 @@
 use std::{
     fs::{self, File},
     path::Path,
+    sync::OnceLock,
 };
 
 use parquet::{
@@ -25,43 +26,28 @@ use softvt::{
 use crate::{
     dataset_recording::Recording,
     serve::{Access, Server},
-    support::{Project, SOLIDS, client::get, files},
+    support::{Project, SOLIDS, assert_contains, client::get, files},
 };
-
-/// The fingers close on a block on a pillar, and their fronts push a bar to the middle of its shelf.
-const SUITE: &str = r#"
-local solids = require "solids"
-local pillar = solids.solid("pillar", { 0.03, 0.03, 0.28 }, softvt.static {})
-local block = solids.solid("block", { 0.03, 0.05, 0.04 }, softvt.rigid { density = 300 })
-local shelf = solids.solid("shelf", { 0.11, 0.08, 0.262 }, softvt.static {})
-local bar = solids.solid("bar", { 0.04, 0.12, 0.04 }, softvt.rigid { density = 300 })
-local layout = softvt.layout("one", function(scene)
-  scene.base = { -0.6, 0, 0 }
-  scene:add { name = "floor", asset = solids.floor, position = { 0, 0, 0 } }
-  scene:add { name = "pillar", asset = pillar, position = { -0.137, -0.005, 0 } }
-  scene:add { name = "block", asset = block, position = { -0.127, -0.005, 0.28 } }
-  scene:add { name = "shelf", asset = shelf, position = { -0.044, -0.005, 0 } }
-  scene:add { name = "bar", asset = bar, position = { -0.088, -0.005, 0.262 } }
-end)
-local function task(prompt)
-  return softvt.task { prompt = prompt, layout = layout, budget_steps = 40,
-    goal = softvt.on { object = "bar", target = "shelf" },
-    expert = function(arm, scene)
-      arm:grasp(0.6, { rate = 1 })
-      arm:move_by({ 0.02, 0, 0 }, { speed = 0.2 })
-      arm:move_by({ -0.015, 0, 0 }, { speed = 0.2 })
-      arm:wait(1)
-    end }
-end
-return softvt.suite { name = "one", object_type = "rigid", tasks_differ_in = "spatial", episodes = 1,
-  tasks = { task("wait a while"), task("wait for it") } }
-"#;
 
 pub(crate) const V21: ExportFormat = ExportFormat::LeRobot(LeRobotVersion::V21);
 const V30: ExportFormat = ExportFormat::LeRobot(LeRobotVersion::V30);
 
-pub(crate) fn project() -> Project {
-    Project::new(&[("x.lua", SUITE), SOLIDS])
+/// Two demonstrations of each task with joint torques in the folder `data`, and one without images in `plain`.
+pub(crate) fn recorded() -> &'static Project {
+    static RECORDED: OnceLock<Project> = OnceLock::new();
+    RECORDED.get_or_init(|| {
+        let suite = include_str!("../data/touched_block.lua");
+        let project = Project::shared("exports", &[("x.lua", suite), SOLIDS]);
+        let with_torques = Recording::new(project.run("x.lua"), 2, "data");
+        with_torques
+            .with(|options| {
+                options.streams = [OptionalStream::named("joint-torques").expect("a stream")].into()
+            })
+            .record();
+        let plain = Recording::new(project.run("x.lua").tasks(&[0]), 1, "plain");
+        plain.with(|options| options.has_images = false).record();
+        project
+    })
 }
 
 /// An export from the folder `data` of a project into `out`.
@@ -129,10 +115,9 @@ fn floats(bytes: &[u8]) -> Vec<f32> {
 
 #[test]
 fn rows_are_the_inputs_of_a_policy() {
-    let project = project();
-    Recording::new(project.run("x.lua").tasks(&[0]), 1, "data").record();
-    export(&config(&project, V21, "out"));
-    let rows = rows(&project.path("out/data/chunk-000/episode_000000.parquet"));
+    let project = recorded();
+    export(&config(project, V21, "inputs"));
+    let rows = rows(&project.path("inputs/data/chunk-000/episode_000000.parquet"));
     let file = TaskFile::open(&project.path("data/hdf5/one_task0_demo.hdf5")).expect("a file");
     let (actions, written) =
         (file.actions(0).expect("actions"), file.array(0, "actions").expect("actions").values);
@@ -174,6 +159,7 @@ fn key_of_lerobot(name: &str) -> &str {
         "wrist_image" => "observation.images.wrist",
         "tactile_image" => "observation.images.tactile_image",
         "state" => "observation.state",
+        "joint_torques" => "observation.joint_torques",
         "tactile_marker_motion" => "observation.tactile_marker_motion",
         "actions" => "action",
         other => other,
@@ -182,24 +168,20 @@ fn key_of_lerobot(name: &str) -> &str {
 
 #[test]
 fn joint_positions_and_torques_are_exported() {
-    let project = project();
-    let recording = Recording::new(project.run("x.lua").tasks(&[0]), 1, "data");
-    recording
-        .with(|options| options.streams = [OptionalStream::named("joint-torques").expect("a stream")].into())
-        .record();
+    let project = recorded();
     let joints =
-        |format, out: &str| ExportConfig { control: ArmControl::Joints, ..config(&project, format, out) };
-    export(&joints(V21, "a"));
-    export(&joints(V30, "b"));
+        |format, out: &str| ExportConfig { control: ArmControl::Joints, ..config(project, format, out) };
+    export(&joints(V21, "joints_a"));
+    export(&joints(V30, "joints_b"));
     let file = TaskFile::open(&project.path("data/hdf5/one_task0_demo.hdf5")).expect("a file");
     let stream = |name: &str| file.array(0, name).expect("a stream").values;
     let (positions, torques) = (stream("obs/arm_joint_pos"), stream("obs/joint_torques"));
     let (widths, commands) = (stream("obs/gripper_width_sensed"), file.joint_commands(0).expect("joints"));
     let actions = file.actions(0).expect("actions");
     let single = |numbers: &[f64]| numbers.iter().map(|x| *x as f32).collect::<Vec<f32>>();
-    let apart = rows(&project.path("a/data/chunk-000/episode_000000.parquet"));
-    let together = rows(&project.path("b/data/chunk-000/file-000.parquet"));
-    assert_eq!((apart.len(), together.len()), (actions.len(), actions.len()));
+    let apart = rows(&project.path("joints_a/data/chunk-000/episode_000000.parquet"));
+    let together = rows(&project.path("joints_b/data/chunk-000/file-000.parquet"));
+    assert!(apart.len() == actions.len() && together.len() > actions.len());
     for (step, (row, other)) in apart.iter().zip(&together).enumerate() {
         let seven = 7 * step..7 * step + 7;
         let state = [&positions[seven.clone()], &[0.5 * widths[step]]].concat();
@@ -216,23 +198,22 @@ fn joint_positions_and_torques_are_exported() {
         }
     }
     assert!(torques.iter().any(|torque| torque.abs() > 0.05), "the hand pushes");
-    let features = &project.json("b/meta/info.json")["features"];
+    let features = &project.json("joints_b/meta/info.json")["features"];
     assert_eq!(features["action"]["shape"][0], 8);
     assert_eq!(features["action"]["names"][6], "joint_7");
-    assert_eq!(project.json("a/meta/softvt.json")["control"], "joints");
+    assert_eq!(project.json("joints_a/meta/softvt.json")["control"], "joints");
 }
 
 #[test]
 fn both_versions_have_the_same_rows() {
-    let project = project();
-    Recording::new(project.run("x.lua"), 2, "data").with(|options| options.has_privileged = false).record();
+    let project = recorded();
     assert_eq!(DatasetCard::read(&project.path("data")).expect("a card").gripper, None);
-    let v21 = |out: &str, threads| ExportConfig { threads, ..config(&project, V21, out) };
+    let v21 = |out: &str, threads| ExportConfig { threads, ..config(project, V21, out) };
     let exported = export(&v21("a", 1));
     assert_eq!((exported.episodes, exported.tasks), (4, 2));
     export(&v21("b", 3));
     assert!(files(&project.path("a")) == files(&project.path("b")), "not the same bytes");
-    let v30 = |out: &str| config(&project, V30, out);
+    let v30 = |out: &str| config(project, V30, out);
     assert_eq!(export(&ExportConfig { data: project.path("data/"), ..v30("c/") }), exported);
     let apart: Vec<Row> = (0..4)
         .flat_map(|i| rows(&project.path(&format!("a/data/chunk-000/episode_{i:06}.parquet"))))
@@ -285,39 +266,44 @@ fn both_versions_have_the_same_rows() {
 
 #[test]
 fn invalid_exports_are_refused_and_leave_nothing() {
-    let project = project();
-    let record = |out: &str| Recording::new(project.run("x.lua").tasks(&[0]), 1, out);
-    record("data").record();
-    record("plain").with(|options| options.has_images = false).record();
+    let project = Project::new(&[]);
+    for (path, bytes) in files(&recorded().path("data")) {
+        project.write(&format!("data/{path}"), &bytes);
+    }
     project.write("full/mine", b"mine");
     let hdf5 = project.path("data/hdf5/one_task0_demo.hdf5");
-    let refusal = |config: &ExportConfig| project.message(export::export(config, || false, |_, _| ()));
-    let config =
-        |data: &str, out: &str| ExportConfig { data: project.path(data), ..config(&project, V21, out) };
-    let task = |word: &str| ExportConfig { tasks: vec![word.to_owned()], ..config("data", "x") };
-    for (config, output) in [
-        (config("data", "full"), "full: it holds mine; nothing was written"),
-        (config("data", "full/mine"), "full/mine: it is not a folder"),
-        (task("7"), "no task matches \"7\""),
-        (task("dance"), "no task matches \"dance\""),
-        (config("full", "x"), "full: dataset.json: it is missing; expected the folder"),
-        (config("nowhere", "x"), "nowhere: dataset.json: it is missing"),
-        (config("plain", "x"), "record them in the HDF5 files"),
-    ] {
-        let message = refusal(&config);
-        assert!(message.contains(output), "{output}: {message}");
-    }
     let whole = fs::read(&hdf5).expect("read");
-    fs::write(&hdf5, &whole[..whole.len() / 2]).expect("written");
-    let message = refusal(&config("data", "x"));
-    assert!(message.contains("one_task0_demo.hdf5") && message.contains("cut short"), "{message}");
-    // One step fewer than the manifest says.
-    fs::write(&hdf5, &whole).expect("written");
     let manifest = project.text("data/manifest.jsonl");
-    let steps = format!("\"num_samples\":{}", project.lines("data/manifest.jsonl")[0]["num_samples"]);
-    project.write("data/manifest.jsonl", manifest.replace(&steps, "\"num_samples\":3").as_bytes());
-    let message = refusal(&config("data", "x"));
-    assert!(message.contains("/data/demo_0/obs/state: expected the shape [3, 7], got ["), "{message}");
-    assert!(!project.path("x").exists() && !project.path("x.part").exists());
-    assert_eq!(files(&project.path("full")).len(), 1);
+    for format in [V21, ExportFormat::Rlds] {
+        let refusal = |config: &ExportConfig| project.message(export::export(config, || false, |_, _| ()));
+        let config = |data: &str, out: &str| ExportConfig {
+            data: project.path(data),
+            ..config(&project, format, out)
+        };
+        let task = |word: &str| ExportConfig { tasks: vec![word.to_owned()], ..config("data", "x") };
+        let plain = ExportConfig { data: recorded().path("plain"), ..config("", "x") };
+        for (config, output) in [
+            (config("data", "full"), "full: it holds mine; nothing was written"),
+            (config("data", "full/mine"), "full/mine: it is not a folder"),
+            (task("7"), "no task matches \"7\""),
+            (task("dance"), "no task matches \"dance\""),
+            (config("full", "x"), "full: dataset.json: it is missing; expected the folder"),
+            (config("nowhere", "x"), "nowhere: dataset.json: it is missing"),
+            (plain, "record them in the HDF5 files"),
+        ] {
+            let message = refusal(&config);
+            assert_contains(&message, output);
+        }
+        fs::write(&hdf5, &whole[..whole.len() / 2]).expect("written");
+        let message = refusal(&config("data", "x"));
+        assert!(message.contains("one_task0_demo.hdf5") && message.contains("cut short"), "{message}");
+        // One step fewer than the manifest says.
+        fs::write(&hdf5, &whole).expect("written");
+        let steps = format!("\"num_samples\":{}", project.lines("data/manifest.jsonl")[0]["num_samples"]);
+        project.write("data/manifest.jsonl", manifest.replacen(&steps, "\"num_samples\":3", 1).as_bytes());
+        assert_contains(refusal(&config("data", "x")), "expected the shape [3, 7], got [");
+        project.write("data/manifest.jsonl", manifest.as_bytes());
+        assert!(!project.path("x").exists() && !project.path("x.part").exists());
+        assert_eq!(files(&project.path("full")).len(), 1);
+    }
 }

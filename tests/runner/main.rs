@@ -1,11 +1,9 @@
-//! Tests of runs by the library: how episodes are judged, what policies and experts do, messages for invalid input,
-//! datasets, reports and servers, with typed results.
+//! Tests of runs by the library: how episodes are judged, what policies and experts do, datasets, reports and servers,
+//! with typed results. `tests/messages.rs` has the messages for invalid input.
 
 mod articulated_objects;
 mod benchmark_validity;
 mod calibration;
-mod cheats;
-mod check;
 mod conditions;
 mod controllers;
 mod dataset_import;
@@ -17,9 +15,6 @@ mod external_scorer;
 mod goals;
 mod grip_codes;
 mod grip_force;
-mod initial_state_coverage;
-mod invalid_scenes;
-mod invalid_scripts;
 mod joint_control;
 mod judged_runs;
 mod judging;

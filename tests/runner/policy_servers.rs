@@ -22,18 +22,18 @@ use softvt::{
 };
 use tungstenite::{Message, WebSocket, accept};
 
-use crate::support::{Project, Run, Small};
+use crate::support::{Project, Run, Small, assert_contains};
 
 type Socket = WebSocket<TcpStream>;
 
-/// Starts a server that handles `visits` connections with `serve`, which gets their number. Returns its address.
-fn server(visits: usize, serve: impl Fn(usize, Socket) + Send + 'static) -> String {
+/// Starts a server that handles `visits` connections with `serve`. Returns its address.
+fn server(visits: usize, serve: impl Fn(Socket) + Send + 'static) -> String {
     let listener = TcpListener::bind("127.0.0.1:0").expect("a port");
     let address = format!("ws://{}", listener.local_addr().expect("an address"));
     thread::spawn(move || {
-        for (number, stream) in listener.incoming().take(visits).enumerate() {
+        for stream in listener.incoming().take(visits) {
             if let Ok(socket) = accept(stream.expect("a connection")) {
-                serve(number, socket);
+                serve(socket);
             }
         }
     });
@@ -68,16 +68,8 @@ fn actions(rows: usize, row: [f32; 7]) -> Value {
 
 /// The robot state of an observation.
 fn state(observation: &Value) -> Vec<f32> {
-    let of = |map: &Value, key: &[u8]| -> Value {
-        let found = map.as_map().expect("a map").iter().find(|(k, _)| match k {
-            Value::String(text) => text.as_bytes() == key,
-            Value::Binary(bytes) => bytes == key,
-            _ => false,
-        });
-        found.expect("an entry").1.clone()
-    };
-    let data = of(&of(observation, b"observation/state"), b"data");
-    data.as_slice().expect("bytes").as_chunks::<4>().0.iter().map(|b| f32::from_le_bytes(*b)).collect()
+    let data = bytes(observation, "observation/state");
+    data.as_chunks::<4>().0.iter().map(|b| f32::from_le_bytes(*b)).collect()
 }
 
 /// The next observation. The socket answers pings by itself.
@@ -91,11 +83,22 @@ fn observation(socket: &mut Socket) -> Option<Value> {
     }
 }
 
-/// Sends the metadata of openpi and replies to each observation with `reply` of its number and content.
-fn answering(mut socket: Socket, reply: impl Fn(usize, &Value) -> Option<Message>) {
-    let _ = socket.send(packed(&Value::Map(Vec::new())));
+/// A server that sends the metadata of openpi and then does as `serve`.
+fn greeting(serve: impl Fn(&mut Socket) + Send + 'static) -> String {
+    server(9, move |mut socket| {
+        let _ = socket.send(packed(&Value::Map(Vec::new())));
+        serve(&mut socket);
+    })
+}
+
+/// A server that replies to each observation of a connection with `reply` of its number and content.
+fn answering(reply: impl Fn(usize, &Value) -> Option<Message> + Send + 'static) -> String {
+    greeting(move |socket| answer(socket, &reply))
+}
+
+fn answer(socket: &mut Socket, reply: impl Fn(usize, &Value) -> Option<Message>) {
     let mut count = 0;
-    while let Some(seen) = observation(&mut socket) {
+    while let Some(seen) = observation(socket) {
         let Some(message) = reply(count, &seen) else { return };
         if socket.send(message).is_err() {
             return;
@@ -120,18 +123,6 @@ fn run<'a>(project: &'a Project, address: &str) -> Run<'a> {
     run.timeout(Duration::from_secs(5))
 }
 
-/// The message of a run that must fail because of its server.
-fn failure(address: &str, change: impl FnOnce(Run) -> Run) -> String {
-    let project = project();
-    let message = change(run(&project, address)).policy_error();
-    assert!(!project.path("run").exists(), "nothing was finished, so nothing is left");
-    message
-}
-
-fn fails(address: &str) -> String {
-    failure(address, |run| run)
-}
-
 /// The message of an episode that could not be run to its end.
 fn error_of(outcome: &Outcome) -> &str {
     match outcome {
@@ -144,11 +135,9 @@ fn error_of(outcome: &Outcome) -> &str {
 fn one_request_is_sent_per_chunk() {
     let asked = Arc::new(AtomicUsize::new(0));
     let count = asked.clone();
-    let address = server(9, move |_, socket| {
-        answering(socket, |_, seen| {
-            count.fetch_add(1, Ordering::Relaxed);
-            Some(hold(seen, 50))
-        });
+    let address = answering(move |_, seen| {
+        count.fetch_add(1, Ordering::Relaxed);
+        Some(hold(seen, 50))
     });
     let project = project();
     run(&project, &address).episodes(2).replan(5).finish();
@@ -164,9 +153,8 @@ fn one_request_is_sent_per_chunk() {
 fn closed_idle_connections_are_reopened() {
     let pongs = Arc::new(AtomicUsize::new(0));
     let count = pongs.clone();
-    let address = server(9, move |_, mut socket| {
-        let _ = socket.send(packed(&Value::Map(Vec::new())));
-        let first = observation(&mut socket).expect("a question");
+    let address = greeting(move |socket| {
+        let first = observation(socket).expect("a question");
         // Both frames are received before the next request.
         let _ = socket.write(hold(&first, 50));
         let _ = socket.write(Message::Ping("still there?".into()));
@@ -175,7 +163,7 @@ fn closed_idle_connections_are_reopened() {
         if answers.take(3).any(|message| matches!(&message, Message::Pong(_))) {
             count.fetch_add(1, Ordering::Relaxed);
         }
-        let Some(second) = observation(&mut socket) else { return };
+        let Some(second) = observation(socket) else { return };
         let _ = socket.write(hold(&second, 50));
         let _ = socket.write(Message::Close(None));
         let _ = socket.flush();
@@ -190,7 +178,7 @@ fn closed_idle_connections_are_reopened() {
 fn websockets_that_a_server_closes_are_reopened_although_it_keeps_their_tcp_connections() {
     let questions = Arc::new(AtomicUsize::new(0));
     let (count, kept) = (questions.clone(), Mutex::new(Vec::new()));
-    let address = server(9, move |_, mut socket| {
+    let address = server(9, move |mut socket| {
         let _ = socket.send(packed(&Value::Map(Vec::new())));
         if let Some(question) = observation(&mut socket) {
             count.fetch_add(1, Ordering::Relaxed);
@@ -204,41 +192,10 @@ fn websockets_that_a_server_closes_are_reopened_although_it_keeps_their_tcp_conn
     assert_eq!(questions.load(Ordering::Relaxed), 3);
 }
 
-/// Five actions that close the gripper: a reply that is wrong for an observation answered by `hold`.
-fn shut() -> Message {
-    packed(&actions(5, [0.4, 0.0, 0.3, 3.1, 0.0, 0.0, 1.0]))
-}
-
-#[test]
-fn surplus_replies_end_the_run() {
-    let address = server(9, |_, mut socket| {
-        let _ = socket.send(packed(&Value::Map(Vec::new())));
-        while let Some(seen) = observation(&mut socket) {
-            let _ = socket.send(hold(&seen, 5));
-            let _ = socket.send(shut());
-        }
-    });
-    let output = fails(&address);
-    assert!(output.contains("sent a message that was not requested"), "{output}");
-}
-
-#[test]
-fn the_timeout_holds_while_pings_arrive() {
-    let address = server(9, move |_, mut socket| {
-        let _ = socket.send(packed(&Value::Map(Vec::new())));
-        let _ = observation(&mut socket);
-        while socket.send(Message::Ping("still there?".into())).is_ok() {
-            thread::sleep(Duration::from_millis(10));
-        }
-    });
-    let output = failure(&address, |run| run.timeout(Duration::from_secs(2)));
-    assert!(output.contains("did not answer within 2 s"), "{output}");
-}
-
 #[test]
 fn the_grip_code_of_a_run_is_stated_and_compared_with_that_of_the_server() {
     let stating = |code: &'static str| {
-        server(9, move |_, mut socket| {
+        server(9, move |mut socket| {
             let _ = socket.send(packed(&Value::Map(vec![(text("gripper"), text(code))])));
             while let Some(seen) = observation(&mut socket) {
                 let state = state(&seen);
@@ -247,12 +204,11 @@ fn the_grip_code_of_a_run_is_stated_and_compared_with_that_of_the_server() {
             }
         })
     };
-    let output = fails(&stating("continuous"));
-    assert!(
-        output.contains("the grip code continuous") && output.contains("vision reads binary"),
-        "{output}"
-    );
     let project = project();
+    assert_contains(
+        run(&project, &stating("continuous")).policy_error(),
+        "the grip code continuous in its metadata, and the profile vision reads binary",
+    );
     run(&project, &stating("force")).gripper(GripCode::Force).finish();
     let info = project.json("run/run.json");
     assert_eq!(
@@ -266,207 +222,129 @@ fn the_grip_code_of_a_run_is_stated_and_compared_with_that_of_the_server() {
     assert!(message.contains("2.5 N; expected 0 to 2 N"), "{message}");
 }
 
-#[test]
-fn missing_servers_are_reported() {
-    let free = TcpListener::bind("127.0.0.1:0").expect("a port").local_addr().expect("an address");
-    let output = failure(&format!("ws://{free}"), |run| run.timeout(Duration::from_millis(300)));
-    assert!(
-        output.contains("no policy server at ws://127.0.0.1") && output.contains("allow it more time"),
-        "{output}"
-    );
-}
-
-#[test]
-fn invalid_addresses_are_input_errors() {
-    let project = project();
-    for (address, words) in [
-        ("wss://host:1", "use a tunnel"),
-        ("http://host:1", "expected ws://HOST:PORT"),
-        ("ws://", "not an address"),
-    ] {
-        let message = run(&project, address).error();
-        assert!(message.contains(words), "{message}");
-    }
-}
-
-#[test]
-fn hanging_servers_time_out() {
-    let address = server(9, |_, mut socket| {
-        let _ = socket.send(packed(&Value::Map(Vec::new())));
-        let _ = observation(&mut socket);
-        // Until the client leaves.
-        let _ = socket.read();
-    });
-    let output = failure(&address, |run| run.timeout(Duration::from_millis(500)));
-    assert!(output.contains("did not answer within 0.5 s"), "{output}");
-    // A server that accepts the connection and never responds.
-    let listener = TcpListener::bind("127.0.0.1:0").expect("a port");
-    let silent = format!("ws://{}", listener.local_addr().expect("an address"));
-    let output = failure(&silent, |run| run.timeout(Duration::from_millis(500)));
-    assert!(output.contains("says nothing"), "{output}");
-}
-
-#[test]
-fn error_messages_of_servers_are_shown() {
-    let address = server(9, |_, socket| {
-        answering(socket, |_, _| {
-            Some(Message::text("Traceback (most recent call last):\nValueError: bad key"))
-        });
-    });
-    let output = fails(&address);
-    assert!(output.contains("reported an error:") && output.contains("ValueError: bad key"), "{output}");
-}
-
-#[test]
-fn malformed_replies_are_reported() {
-    let of = |value: Value| Value::Map(vec![(text("actions"), value)]);
-    let floats = |n: usize| vec![0; 4 * n];
-    for (reply, words) in [
-        (packed(&of(array("<f4", &[10, 6], floats(60)))), "[10, 6]: too few numbers"),
-        (packed(&of(array("<f4", &[0, 7], floats(0)))), "no action at all"),
-        (packed(&of(array("<f4", &[10, 7], floats(3)))), "with 12 bytes"),
-        (packed(&of(array("<U7", &[10, 7], floats(70)))), "dtype \"<U7\""),
-        (packed(&of(text("left"))), "has text as actions"),
-        (packed(&Value::Map(vec![(text("act"), Value::Nil)])), "no entry actions; it has act"),
-        (packed(&Value::Nil), "is nil"),
-        (Message::binary(vec![0xC1; 40]), "msgpack"),
-        (Message::binary(vec![0xDD, 0xFF, 0xFF, 0xFF, 0xFF]), "msgpack"),
-        (Message::binary(vec![0x91; 5000]), "msgpack"),
-        (Message::binary(Vec::new()), "msgpack"),
-        (
-            Message::binary([&[0xDD, 0, 0x20, 0, 0][..], &[0xC0; 2 << 20]].concat()),
-            "more than 1048576 values",
-        ),
-    ] {
-        let address = server(9, move |_, socket| answering(socket, |_, _| Some(reply.clone())));
-        let output = fails(&address);
-        assert!(output.contains(words), "{words}: {output}");
-    }
-}
-
-#[test]
-fn huge_replies_are_refused_unread() {
-    let address = server(9, |_, mut socket| {
-        let _ = socket.send(packed(&Value::Map(Vec::new())));
-        let _ = observation(&mut socket);
-        let mut frame = vec![0x82, 127];
-        frame.extend((1_u64 << 30).to_be_bytes());
-        let _ = socket.get_mut().write_all(&frame);
-        let megabyte = vec![0; 1 << 20];
-        while socket.get_mut().write_all(&megabyte).is_ok() {}
-    });
-    let output = fails(&address);
-    assert!(output.contains("more than 64 MiB"), "{output}");
-}
-
-#[test]
-fn other_protocols_are_reported() {
-    let address = server(9, |_, mut socket| {
-        let _ = socket.send(packed(&Value::from(7)));
-    });
-    assert!(fails(&address).contains("sent a number first"), "a greeting that is not a map");
-    let address = server(9, |_, socket| answering(socket, |_, seen| Some(packed(seen))));
-    let output = failure(&address, |run| {
-        let run = run.timeout(Duration::from_secs(1));
-        run.with_policy(|policy| policy.protocol = Some(ServerProtocol::VlaEval))
-    });
-    assert!(output.contains("vla-eval"), "{output}");
+/// A server that does as `serve` with each bare connection.
+fn listening(serve: impl Fn(TcpStream) + Send + 'static) -> String {
     let listener = TcpListener::bind("127.0.0.1:0").expect("a port");
     let address = format!("ws://{}", listener.local_addr().expect("an address"));
-    thread::spawn(move || {
-        for stream in listener.incoming().flatten().take(2) {
-            let mut stream = stream;
-            let _ = stream.write_all(b"HTTP/1.1 404 Not Found\r\nContent-Length: 0\r\n\r\n");
-            // Until the client leaves.
-            let _ = stream.read_to_end(&mut Vec::new());
+    thread::spawn(move || listener.incoming().flatten().for_each(serve));
+    address
+}
+
+#[test]
+fn a_run_ends_with_what_its_server_did() {
+    let ask = |seconds: f64, protocol: Option<ServerProtocol>, address: String| {
+        let project = project();
+        let run = run(&project, &address).timeout(Duration::from_secs_f64(seconds));
+        let message = run.with_policy(|policy| policy.protocol = protocol).policy_error();
+        assert!(!project.path("run").exists(), "nothing was finished, so nothing is left");
+        message
+    };
+    let reply = |reply: Message| answering(move |_, _| Some(reply.clone()));
+    let of = |value: Value| packed(&Value::Map(vec![(text("actions"), value)]));
+    let twice = greeting(|socket| {
+        while let Some(seen) = observation(socket) {
+            let _ = socket.send(hold(&seen, 5));
+            let _ = socket.send(hold(&seen, 5));
         }
     });
-    assert!(fails(&address).contains("not a websocket server"), "a web server");
+    let huge = greeting(|socket| {
+        let _ = observation(socket);
+        let _ = socket.get_mut().write_all(&[&[0x82, 127], &(1_u64 << 30).to_be_bytes()[..]].concat());
+        while socket.get_mut().write_all(&[0; 1 << 20]).is_ok() {}
+    });
+    let web = listening(|mut stream| {
+        let _ = stream.write_all(b"HTTP/1.1 404 Not Found\r\nContent-Length: 0\r\n\r\n");
+        // Until the client leaves.
+        let _ = stream.read_to_end(&mut Vec::new());
+    });
+    let greets_by_7 = server(9, |mut socket| drop(socket.send(packed(&Value::from(7)))));
+    for (address, words) in [
+        (twice, "sent a message that was not requested"),
+        (reply(Message::text("ValueError: bad key")), "reported an error:\nValueError: bad key"),
+        (reply(of(array("<f4", &[10, 6], vec![0; 240]))), "[10, 6]: too few numbers"),
+        (reply(of(array("<f4", &[10, 7], vec![0; 12]))), "with 12 bytes"),
+        (reply(of(text("left"))), "has text as actions"),
+        (reply(packed(&Value::Nil)), "is nil"),
+        (reply(Message::binary(vec![0xDD, 0xFF, 0xFF, 0xFF, 0xFF])), "msgpack"),
+        (reply(Message::binary(vec![0x91; 5000])), "msgpack"),
+        (reply(Message::binary(Vec::new())), "msgpack"),
+        (huge, "more than 64 MiB"),
+        (greets_by_7, "sent a number first"),
+        (web, "not a websocket server"),
+    ] {
+        let output = ask(5.0, None, address);
+        assert_contains(&output, words);
+    }
+    let silent = greeting(|socket| while observation(socket).is_some() {});
+    let pings = greeting(|socket| {
+        let _ = observation(socket);
+        while socket.send(Message::Ping("still there?".into())).is_ok() {
+            thread::sleep(Duration::from_millis(10));
+        }
+    });
+    let mute = listening(|mut stream| drop(stream.read_to_end(&mut Vec::new())));
+    for (protocol, address, words) in [
+        (None, silent, "did not answer within 0.5 s"),
+        (None, pings, "did not answer within 0.5 s"),
+        (None, mute, "says nothing"),
+        (Some(ServerProtocol::VlaEval), answering(|_, seen| Some(packed(seen))), "vla-eval"),
+    ] {
+        let output = ask(0.5, protocol, address);
+        assert_contains(&output, words);
+    }
 }
 
 #[test]
 fn nan_replies_fail_only_their_episode() {
-    let address = server(9, |_, socket| {
-        answering(socket, |count, seen| match count {
-            1 => Some(packed(&actions(5, [f32::NAN; 7]))),
-            _ => Some(hold(seen, 5)),
-        });
+    let address = answering(|count, seen| match count {
+        1 => Some(packed(&actions(5, [f32::NAN; 7]))),
+        _ => Some(hold(seen, 5)),
     });
     let project = project();
     let records = run(&project, &address).episodes(2).replan(5).records();
-    let message = error_of(&records[0].outcome);
-    assert!(message.contains("not finite"), "{message}");
+    assert_contains(error_of(&records[0].outcome), "not finite");
     assert_eq!((records[0].stats.steps, records[0].verdict.safety), (5, false));
     assert_eq!(records[1].outcome, Outcome::Budget);
     assert!(project.is_reproduced("run", "0/0"));
 }
 
 #[test]
-fn unreachable_poses_are_counted() {
-    let address = server(9, |_, socket| {
-        answering(socket, |_, _| Some(packed(&actions(9, [50.0, 0.0, -3.0, 0.0, 9.0, 0.0, 7.0]))))
-    });
+fn commands_out_of_reach_are_counted_and_shown() {
+    let far = || packed(&actions(9, [50.0, 0.0, -3.0, 0.0, 9.0, 0.0, 7.0]));
     let project = project();
-    let finished = run(&project, &address).finish();
-    let messages = finished.messages.clone();
-    let record = finished.records().swap_remove(0);
+    let record = run(&project, &answering(move |_, _| Some(far()))).record();
     assert_eq!((record.stats.far_commands, record.stats.clamped_grips), (12, 12));
     assert!(!record.verdict.safety);
-    let message = "all 12 commands were out of reach, first: (50, 0, -3) m";
-    assert!(error_of(&record.outcome).starts_with(message), "{record:?}");
-    assert!(messages.contains(message), "{messages}");
+    assert_contains(error_of(&record.outcome), "all 12 commands were out of reach, first: (50, 0, -3) m");
     assert!(project.is_reproduced("run", "0/0"));
-}
 
-#[test]
-fn commands_that_are_not_executed_as_given_are_shown() {
-    let address = server(9, |_, socket| {
-        answering(socket, |count, seen| match count {
-            0 => Some(hold(seen, 6)),
-            _ => Some(packed(&actions(6, [50.0, 0.0, -3.0, 0.0, 0.0, 0.0, 255.0]))),
-        });
-    });
-    let project = project();
-    let finished = run(&project, &address).replan(6).finish();
-    let messages = &finished.messages;
-    let far = "; 6 of 12 commands were out of reach, first: (50, 0, -3) m, 49.";
-    assert!(messages.contains(far), "{messages}");
-    assert!(messages.contains("; 6 of 12 grip values were out of range"), "{messages}");
+    let address = answering(move |count, seen| if count == 0 { Some(hold(seen, 6)) } else { Some(far()) });
+    let finished = run(&project, &address).replan(6).out("half").finish();
+    assert_contains(&finished.messages, "; 6 of 12 commands were out of reach, first: (50, 0, -3) m, 49.");
+    assert_contains(&finished.messages, "; 6 of 12 grip values were out of range");
     let summary = finished.result().summary;
     assert_eq!((summary.commands.far, summary.commands.clamped_grips), (6, 6));
     let table = terminal::table(&summary, TerminalFormat::PLAIN.with_details());
-    for line in [
-        "6 of 12 commands were out of reach in 1 episode",
-        "6 of 12 grip values were out of range in 1 episode",
-    ] {
-        assert!(table.contains(line), "{table}");
-    }
-    let report = project.report(&["run"]);
+    assert_contains(&table, "6 of 12 commands were out of reach in 1 episode");
+    let report = project.report(&["half"]);
     for text in [report.html, report.markdown] {
-        assert!(text.contains("Commands that were not executed as given") && text.contains("(50, 0, -3) m"));
+        assert_contains(&text, "Commands that were not executed as given");
+        assert_contains(&text, "(50, 0, -3) m");
     }
-}
-
-#[test]
-fn actions_of_eight_numbers_need_a_profile_that_states_their_length() {
-    let eight = || Value::Map(vec![(text("actions"), array("<f4", &[5, 8], vec![0; 160]))]);
-    let address = server(9, move |_, socket| answering(socket, |_, _| Some(packed(&eight()))));
-    let refused = fails(&address);
-    assert!(
-        refused.contains("8 numbers per action are neither 7 nor the 32 of openpi's padding"),
-        "{refused}"
-    );
 }
 
 #[test]
 fn a_dying_server_loses_no_finished_episode() {
     let whole = project();
-    let address = server(9, |_, socket| answering(socket, |_, seen| Some(hold(seen, 50))));
+    let address = answering(|_, seen| Some(hold(seen, 50)));
     run(&whole, &address).episodes(3).finish();
     let broken = project();
-    let dying = server(1, |_, socket| answering(socket, |count, seen| (count < 3).then(|| hold(seen, 50))));
+    let dying = server(1, |mut socket| {
+        let _ = socket.send(packed(&Value::Map(Vec::new())));
+        answer(&mut socket, |count, seen| (count < 3).then(|| hold(seen, 50)));
+    });
     let message = run(&broken, &dying).episodes(3).timeout(Duration::from_secs(1)).policy_error();
-    assert!(message.contains("1 of 3 episodes are in run"), "{message}");
+    assert_contains(&message, "1 of 3 episodes are in run");
     run(&broken, &address).episodes(3).resume().finish();
     assert_eq!(broken.lines("run/episodes.jsonl")[1]["attempts"], 2, "the server ended the first one");
     let counted = broken.text("run/episodes.jsonl");
@@ -484,19 +362,16 @@ fn a_dying_server_loses_no_finished_episode() {
     let manifest = |project: &Project| project.relative(project.text("run/run.json"));
     assert_eq!(manifest(&broken), manifest(&whole));
     let again = || run(&broken, &address).episodes(3).finish().messages;
-    let messages = again();
-    assert!(messages.contains("already complete"), "{messages}");
+    assert_contains(again(), "already complete");
     // Files of finished episodes are restored from the actions, without the policy; without actions they are reported
     // as lost.
     let log = "run/softvtbench/task_000/episode_00001/policy_action_debug.jsonl";
     let text = broken.text(log);
     fs::remove_file(broken.path(log)).expect("removed");
-    let messages = again();
-    assert!(messages.contains("restoring files of 1 finished episode"), "{messages}");
+    assert_contains(again(), "restoring files of 1 finished episode");
     assert_eq!(broken.text(log), text);
     fs::remove_dir_all(broken.path("run/actions")).expect("removed");
-    let messages = again();
-    assert!(messages.contains("3 finished episodes lack their actions"), "{messages}");
+    assert_contains(again(), "3 finished episodes lack their actions");
     assert_eq!(broken.text("run/episodes.jsonl"), counted);
 }
 
@@ -505,13 +380,10 @@ fn profiles_determine_the_inputs() {
     let entries = |profile: &str, gripper: Option<GripCode>| {
         let names = Arc::new(Mutex::new(Vec::new()));
         let kept = names.clone();
-        let address = server(9, move |_, socket| {
-            answering(socket, |_, seen| {
-                let map = seen.as_map().expect("a map");
-                *kept.lock().unwrap() =
-                    map.iter().map(|(k, _)| k.as_str().unwrap_or("").to_owned()).collect();
-                Some(hold(seen, 50))
-            });
+        let address = answering(move |_, seen| {
+            let map = seen.as_map().expect("a map");
+            *kept.lock().unwrap() = map.iter().map(|(k, _)| k.as_str().unwrap_or("").to_owned()).collect();
+            Some(hold(seen, 50))
         });
         let project = project();
         let run = run(&project, &address).profile(profile);
@@ -536,18 +408,10 @@ fn a_judged_run_names_its_episodes_to_the_server_by_hashes_alone() {
     let identities = |is_judged: bool| {
         let seen = Arc::new(Mutex::new(Vec::new()));
         let kept = seen.clone();
-        let address = server(9, move |_, socket| {
-            answering(socket, |_, observation| {
-                let entries = observation.as_map().expect("a map").iter();
-                let identity =
-                    entries.clone().find(|(key, _)| key.as_str() == Some("softvt")).expect("it is sent");
-                let seed = entries
-                    .clone()
-                    .find(|(key, _)| key.as_str() == Some("__softvtbench_rng_seed"))
-                    .expect("sent");
-                kept.lock().unwrap().push((identity.1.clone(), seed.1.clone()));
-                Some(hold(observation, 4))
-            });
+        let address = answering(move |_, observation| {
+            let sent = ["softvt", "__softvtbench_rng_seed"].map(|key| entry(observation, key).clone());
+            kept.lock().unwrap().push(sent);
+            Some(hold(observation, 4))
         });
         let project = project();
         project.write("secret", b"correct horse battery staple");
@@ -556,69 +420,23 @@ fn a_judged_run_names_its_episodes_to_the_server_by_hashes_alone() {
         let seen = seen.lock().unwrap();
         seen.clone()
     };
-    let entry = |identity: &Value, name: &str| -> Option<Value> {
-        let entries = identity.as_map().expect("a map");
-        entries.iter().find(|(key, _)| key.as_str() == Some(name)).map(|(_, value)| value.clone())
-    };
     let judged = identities(true);
     assert_eq!(judged.len(), 6, "three requests in each of two episodes");
-    let ids: BTreeSet<String> =
-        judged.iter().map(|(identity, _)| entry(identity, "id").expect("a name").to_string()).collect();
+    let ids: BTreeSet<String> = judged.iter().map(|[id, _]| entry(id, "id").to_string()).collect();
     assert_eq!(ids.len(), 2, "a name per episode");
-    let seeds: BTreeSet<String> = judged.iter().map(|(_, seed)| seed.to_string()).collect();
+    let seeds: BTreeSet<String> = judged.iter().map(|[_, seed]| seed.to_string()).collect();
     assert_eq!(seeds.len(), 6, "a seed per request");
-    for (identity, seed) in &judged {
+    for [identity, seed] in &judged {
         let names: Vec<_> =
             identity.as_map().expect("a map").iter().map(|(key, _)| key.as_str().unwrap()).collect();
         assert_eq!(names, ["id", "step", "query", "seed", "wants_actions"]);
-        assert_eq!(entry(identity, "seed").as_ref(), Some(seed));
+        assert_eq!(entry(identity, "seed"), seed);
     }
     assert_eq!(judged, identities(true), "the same requests again");
-    let open = identities(false);
-    assert!(entry(&open[0].0, "suite").is_some() && entry(&open[0].0, "id").is_none());
+    let [open, _] = &identities(false)[0];
+    let names: Vec<_> = open.as_map().expect("a map").iter().filter_map(|(key, _)| key.as_str()).collect();
+    assert!(names.contains(&"suite") && !names.contains(&"id"), "{names:?}");
 }
-
-#[test]
-fn lines_of_another_run_are_refused() {
-    let project = project();
-    let run = || project.run("x.lua").policy("noop").episodes(2).threads(1).out("run");
-    run().finish();
-    let (lines, info) = (project.text("run/episodes.jsonl"), project.text("run/run.json"));
-    let refused = |text: &str, words: &str| {
-        project.write("run/episodes.jsonl", text.as_bytes());
-        let message = run().resume().error();
-        assert!(message.contains(words), "{message}");
-    };
-    refused(&format!("{lines}{lines}"), "run/episodes.jsonl:3: task 0 episode 0 occurs twice");
-    refused(
-        &lines.replace("\"noop\"", "\"other\""),
-        "run/episodes.jsonl:1: its SHA-256 is not the record_sha256 at its end",
-    );
-    project.write("run/episodes.jsonl", lines.as_bytes());
-    fs::remove_file(project.path("run/run.json")).expect("removed");
-    assert!(run().resume().error().contains("cannot read run/run.json"));
-    project.write("run/run.json", info.as_bytes());
-    assert!(run().resume().finish().messages.contains("already complete"));
-}
-
-/// A profile with entries of several control steps, and of every kind of image.
-const HISTORY: &str = r#"return softvt.profile {
-  name = "history",
-  inputs = {
-    { keys = { "observation/state" }, source = "state", parts = { "position", "axis_angle", "closure" } },
-    { keys = { "two" }, source = "camera", camera = "wrist", frames = 2 },
-    { keys = { "one" }, source = "camera", camera = "wrist", frames = 1 },
-    { keys = { "depth" }, source = "depth", camera = "wrist" },
-    { keys = { "objects" }, source = "segmentation", camera = "wrist", frames = 3 },
-    { keys = { "arm" }, source = "state", parts = { "joints", "joint_velocities", "joint_torques" }, frames = 4 },
-    { keys = { "markers" }, source = "marker_motion", frames = 2 },
-    { keys = { "drawn" }, source = "tactile", finger = "left", markers = "black_arrows", frames = 2 },
-    { keys = { "mosaic" }, source = "tactile_image", markers = "dots" },
-    { keys = { "id" }, source = "query" },
-    { keys = { "seed" }, source = "query_seed" },
-  },
-  actions = { pose = "absolute", gripper = { open = 0, closed = 1 } },
-OBSERVE}"#;
 
 /// The entry of a map.
 fn entry<'a>(map: &'a Value, key: &str) -> &'a Value {
@@ -638,12 +456,12 @@ fn bytes<'a>(observation: &'a Value, key: &str) -> &'a [u8] {
 /// The messages that a server gets in an episode of 12 steps in chunks of 5, with the metadata `greeting`.
 fn messages(
     greeting: Value,
-    observe: &str,
+    observes: bool,
     change: impl Fn(Run) -> Run,
 ) -> Result<Vec<Value>, (RunErrorCause, String)> {
     let seen = Arc::new(Mutex::new(Vec::new()));
     let kept = seen.clone();
-    let address = server(9, move |_, mut socket| {
+    let address = server(9, move |mut socket| {
         let _ = socket.send(packed(&greeting));
         while let Some(message) = observation(&mut socket) {
             let wants = entry(entry(&message, "id"), "wants_actions").as_bool().expect("stated");
@@ -655,7 +473,8 @@ fn messages(
         }
     });
     let project = project();
-    project.write("history.lua", HISTORY.replace("OBSERVE", observe).as_bytes());
+    project.write("history.lua", include_bytes!("../data/history.lua"));
+    project.replace("history.lua", "step = false", &format!("step = {observes}"));
     let run = run(&project, &address).profile("history.lua").replan(5).timeout(Duration::from_secs(20));
     change(run.episodes(1)).attempt()?;
     let messages = seen.lock().expect("kept").clone();
@@ -664,7 +483,7 @@ fn messages(
 
 #[test]
 fn entries_have_as_many_control_steps_as_the_profile_asks_for() {
-    let messages = messages(Value::Map(Vec::new()), "", |run| run.seed(11)).expect("it answers");
+    let messages = messages(Value::Map(Vec::new()), false, |run| run.seed(11)).expect("it answers");
     assert_eq!(messages.len(), 3);
     let edge = 224;
     for message in &messages {
@@ -703,9 +522,8 @@ fn entries_have_as_many_control_steps_as_the_profile_asks_for() {
 #[test]
 fn a_server_or_a_profile_may_ask_for_an_observation_in_every_control_step() {
     let asks = Value::Map(vec![(text("observe_every_step"), Value::Boolean(true))]);
-    let by_server = messages(asks, "", |run| run).expect("it answers");
-    let every_step = "  observe_every_step = true,\n";
-    let by_profile = messages(Value::Map(Vec::new()), every_step, |run| run).expect("it answers");
+    let by_server = messages(asks, false, |run| run).expect("it answers");
+    let by_profile = messages(Value::Map(Vec::new()), true, |run| run).expect("it answers");
     for messages in [&by_server, &by_profile] {
         assert_eq!(messages.len(), 12);
         let wants = |message: &Value| entry(entry(message, "id"), "wants_actions").as_bool();
@@ -719,13 +537,13 @@ fn a_server_or_a_profile_may_ask_for_an_observation_in_every_control_step() {
     }
     assert_eq!(by_server, by_profile);
     let wrong = Value::Map(vec![(text("observe_every_step"), text("yes"))]);
-    let (cause, message) = messages(wrong, "", |run| run).expect_err("no truth value");
+    let (cause, message) = messages(wrong, false, |run| run).expect_err("no truth value");
     assert_eq!(cause, RunErrorCause::Policy);
     assert!(message.contains("observe_every_step in its metadata; expected true or false"), "{message}");
-    let refused = messages(Value::Map(Vec::new()), every_step, |run| {
+    let refused = messages(Value::Map(Vec::new()), true, |run| {
         run.with_policy(|policy| policy.protocol = Some(ServerProtocol::VlaEval))
     });
     let (cause, message) = refused.expect_err("another protocol");
     assert_eq!(cause, RunErrorCause::Input);
-    assert!(message.contains("observe_every_step needs the protocol openpi"), "{message}");
+    assert_contains(&message, "observe_every_step needs the protocol openpi");
 }

@@ -13,7 +13,7 @@ use softvt::{
 use crate::{
     serve::{Access, Server, of},
     support::{
-        Project, Run, Small,
+        Project, Run, Small, assert_contains,
         client::{Client, get, map, reset, step},
     },
 };
@@ -93,7 +93,7 @@ fn a_served_run_equals_a_run_of_the_same_actions() {
     assert!(first.is_recorded(&actions[11..]));
     assert!(project.path("served/summary.json").exists(), "written with the last episode");
     let (summaries, messages) = server.finish();
-    assert!(messages.contains("one [1/2] task 0 episode 1: ○ goal missed"), "{messages}");
+    assert_contains(&messages, "one [1/2] task 0 episode 1: ○ goal missed");
     assert!(!messages.contains("will not be recorded"), "{messages}");
 
     project.run("x.lua").policy("random").episodes(2).out("two").finish();
@@ -147,8 +147,10 @@ fn a_served_run_is_replayed_compared_and_reported() {
     let viewed = "softvt view x.lua --task 0 --policy served --out seen";
     assert!(report.html.contains(viewed), "a command that repeats the actions");
     let compared = project.compare("random", "served").expect("comparable");
-    let table = comparison_table::table(&compared, TerminalFormat::PLAIN.with_details());
-    assert!(table.contains("random → mine · 2 paired episodes"), "{table}");
+    assert_contains(
+        comparison_table::table(&compared, TerminalFormat::PLAIN.with_details()),
+        "random → mine · 2 paired episodes",
+    );
     // The last episode, by a server that resumes the run.
     let server = Server::start(&mine().resume());
     let (mut client, _) = server.client();
@@ -394,8 +396,7 @@ fn folders_that_do_not_fit_are_refused() {
             "tasks 7: suite one has no such task",
         ),
     ] {
-        let message = Server::try_start(&run, access).err().expect(expected);
-        assert!(message.contains(expected), "{message}");
+        assert_contains(Server::try_start(&run, access).err().expect(expected), expected);
     }
     assert_eq!(project.text("served/run.json"), before);
     let (summaries, _) = Server::start(&served(&project, 2, "empty")).finish();

@@ -3,13 +3,14 @@
 //! project.
 
 use std::{
+    fs,
     path::{Path, PathBuf},
-    sync::{Arc, Mutex},
+    sync::{Arc, LazyLock, Mutex, OnceLock},
     time::Duration,
 };
 
 use softvt::{
-    benchmark::{Plan, ShiftValue, seed::SecretSeed},
+    benchmark::{ShiftValue, seed::SecretSeed},
     parallel::lock,
     policy::profile::GripCode,
     report::{
@@ -25,20 +26,26 @@ use softvt::{
         episode_selector::EpisodeSelector,
         experiment::{self, ExperimentOutput},
         replay::{self, SecretFile},
-        suite_selection::check_distinct_out_dirs,
     },
     runs::{
         record::EpisodeRecord,
         shard_merge,
         stored_run::{self, StoredRun},
     },
-    script::{ExperimentInput, ExperimentRow},
+    script::ExperimentRow,
 };
 
 #[path = "../project/mod.rs"]
 mod project;
 
 pub use project::{Project, SOLIDS, SPATIAL_SOFT, Small, client, files, fixtures};
+
+/// Checks that a message has a part.
+#[track_caller]
+pub fn assert_contains(message: impl AsRef<str>, part: &str) {
+    let message = message.as_ref();
+    assert!(message.contains(part), "{part:?} is not in:\n{message}");
+}
 
 /// Messages and lines of progress.
 #[derive(Default)]
@@ -62,6 +69,31 @@ impl Messages {
 }
 
 impl Project {
+    /// A project with a script of `tests/data/` as `x.lua`.
+    pub fn of(script: &str) -> Self {
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data").join(script);
+        let text = fs::read_to_string(&path).unwrap_or_else(|e| panic!("{script}: {e}"));
+        Self::new(&[("x.lua", &text), SOLIDS])
+    }
+
+    /// Replaces a part of a text file.
+    pub fn replace(&self, path: &str, from: &str, to: &str) {
+        let text = self.text(path);
+        assert!(text.contains(from), "{from} in {path}:\n{text}");
+        self.write(path, text.replace(from, to).as_bytes());
+    }
+
+    /// A new project that tests share. Its folder stays until the next run of the tests.
+    pub fn shared(name: &str, files: &[(&str, &str)]) -> Self {
+        let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
+        if folder.exists() {
+            fs::remove_dir_all(&folder).expect("removed");
+        }
+        let project = Self { folder, is_kept: true };
+        files.iter().for_each(|(path, text)| project.write(path, text.as_bytes()));
+        project
+    }
+
     /// A run of a script of the project or of the repository.
     pub fn run(&self, file: &str) -> Run<'_> {
         let messages = Arc::new(Messages::default());
@@ -309,53 +341,41 @@ impl Run<'_> {
 
     /// The message for invalid input.
     pub fn error(self) -> String {
-        match self.attempt() {
-            Err((RunErrorCause::Input, message)) => message,
-            Err(other) => panic!("{other:?}"),
-            Ok(finished) => panic!("it succeeds\n{}", finished.messages),
-        }
+        self.failure(RunErrorCause::Input)
     }
 
     /// The message of a policy that fails.
     pub fn policy_error(self) -> String {
+        self.failure(RunErrorCause::Policy)
+    }
+
+    fn failure(self, expected: RunErrorCause) -> String {
         match self.attempt() {
-            Err((RunErrorCause::Policy, message)) => message,
+            Err((cause, message)) if cause == expected => message,
             Err(other) => panic!("{other:?}"),
             Ok(finished) => panic!("it succeeds\n{}", finished.messages),
         }
     }
 
-    /// Checks the script without running it, as `softvt check` does. Returns the warnings.
+    /// Checks the scenes of the suites of the script. Returns the warnings.
     pub fn check(self) -> Result<Vec<String>, String> {
-        let (warnings, checked) = self.check_to_end();
-        checked.map(|()| warnings)
-    }
-
-    /// As [`Self::check`], with the warnings of a script that is refused as well.
-    pub fn check_to_end(self) -> (Vec<String>, Result<(), String>) {
         let mut warnings = Vec::new();
         let mut checked = || -> Result<(), RunError> {
             let run = self.load()?;
-            let ConfiguredScript { config, script } = &run;
-            check_distinct_out_dirs(config, script.plan.suites())?;
             let checker = SuiteChecker::new(&run);
-            for suite in script.plan.suites() {
-                checker.check(suite, config.episodes.unwrap_or(1), |warning| warnings.push(warning))?;
-            }
-            match &script.plan {
-                Plan::Conditions { .. } => {
-                    conditions::check(&run)?;
-                }
-                Plan::Experiment { .. } => {
-                    let input = ExperimentInput::new(config.settings.clone(), config.seed);
-                    input.map_err(|error| config.error(error))?;
-                }
-                Plan::Suite(_) | Plan::Suites { .. } => {}
+            for suite in run.script.plan.suites() {
+                let episodes = run.config.episodes.unwrap_or(1);
+                checker.check(suite, episodes, |warning| warnings.push(warning))?;
             }
             Ok(())
         };
-        let checked = checked().map_err(|error| self.project.relative(error));
-        (warnings, checked)
+        checked().map(|()| warnings).map_err(|error| self.project.relative(error))
+    }
+
+    /// Checks the conditions of the script, without the scenes of its suites.
+    pub fn check_conditions(self) -> Result<(), String> {
+        let checked = || conditions::check(&self.load()?).map(drop);
+        checked().map_err(|error: RunError| self.project.relative(error))
     }
 
     /// Runs the conditions of the script into the output folder.
@@ -403,4 +423,19 @@ impl Finished {
     pub fn records(self) -> Vec<EpisodeRecord> {
         self.result().records
     }
+}
+
+/// The first episodes of two tasks of Spatial-Soft with different objects, by a policy, on two threads and with traces.
+/// Tests share the runs.
+pub fn spatial_soft(policy: &str) -> (&'static Project, &'static [EpisodeRecord]) {
+    static PROJECT: LazyLock<Project> = LazyLock::new(|| Project::shared("spatial_soft", &[]));
+    static RUNS: [OnceLock<Vec<EpisodeRecord>>; 4] = [const { OnceLock::new() }; 4];
+    let policies = ["expert", "expert-binary", "noop", "random"];
+    let records = &RUNS[policies.iter().position(|name| *name == policy).expect("a shared run")];
+    (&PROJECT, records.get_or_init(|| spatial_soft_run(&PROJECT, policy).threads(2).out(policy).records()))
+}
+
+/// The run of [`spatial_soft`] in another project.
+pub fn spatial_soft_run<'a>(project: &'a Project, policy: &str) -> Run<'a> {
+    project.run(SPATIAL_SOFT).tasks(&[0, 9]).episodes(1).policy(policy).trace(TraceDetail::State)
 }

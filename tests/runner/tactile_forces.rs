@@ -4,20 +4,19 @@ use softvt::script::ExperimentRow;
 
 use crate::support::Project;
 
-const HOLD: &str = include_str!("../data/tactile_hold.lua");
-
 fn rows(body: &str, closure: &str, settings: &str) -> Vec<ExperimentRow> {
-    let text = HOLD.replace("BODY", body).replace("CLOSURE", closure).replace("SETTINGS", settings);
-    Project::new(&[("hold.lua", &text)]).run("hold.lua").rows()
+    let project = Project::of("tactile_hold.lua");
+    for (word, value) in [("BODY", body), ("CLOSURE", closure), ("SETTINGS", settings)] {
+        project.replace("x.lua", word, value);
+    }
+    project.run("x.lua").rows()
 }
-
-const FOLLOW: &str = include_str!("../data/markers_follow.lua");
 
 #[test]
 fn markers_follow_a_stuck_motion_by_the_shares_that_the_documentation_states() {
     let page =
         std::fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/docs/tactile.md")).expect("a page");
-    let rows = Project::new(&[("follow.lua", FOLLOW)]).run("follow.lua").rows();
+    let rows = Project::of("markers_follow.lua").run("x.lua").rows();
     for row in &rows {
         let start = format!("| {} |", row["shape"].as_str().expect("a text"));
         let stated = page.lines().find(|line| line.starts_with(&start)).expect("a row of the page");
@@ -86,22 +85,4 @@ fn the_sensors_model_pitch_and_gel_are_settings() {
     let (stiff, plain) = (stage(&stiff, "held")[0].clone(), stage(&plain, "held")[0].clone());
     assert!(number(&stiff, "depth_mm") < 0.9 * number(&plain, "depth_mm"));
     assert!(stiff["x"] != plain["x"] && stiff["mean"] != plain["mean"]);
-    let refusal = |settings: &str| {
-        let text = HOLD.replace("BODY", "softvt.rigid { density = 1700 }").replace("CLOSURE", "0.53");
-        let (_, outcome) =
-            Project::new(&[("hold.lua", &text.replace("SETTINGS", settings))]).run("hold.lua").experiment();
-        outcome.expect_err(settings)
-    };
-    let unknown = refusal("{ tactile = { optics = { model = \"photon\" } } }");
-    assert!(
-        unknown.contains("photon") && unknown.contains("`polynomial`") && unknown.contains("hold.lua:"),
-        "{unknown}"
-    );
-    let pitch = refusal("{ tactile = { view = { pitch = 0 } } }");
-    assert!(pitch.contains("tactile.view.pitch: expected a number in 0.00001..0.0002 (m)"), "{pitch}");
-    let tables = refusal("{ tactile = { optics = { model = \"taxim\", tables = \"nowhere\" } } }");
-    assert!(tables.contains("nowhere"), "{tables}");
-    let shadows = "{ tactile = { shadows = true, optics = { model = \"taxim\", tables = \"nowhere\" } } }";
-    let shadows = refusal(shadows);
-    assert!(shadows.contains("tactile.shadows: expected false with the model \"taxim\""), "{shadows}");
 }
