@@ -9,6 +9,7 @@ use softvt::{
         chart::{Chart, ChartPoint, Curve, Layout, Margins, Mark, SINGLE_CURVE},
         drawing::Symbol,
     },
+    script::envelope_plot,
 };
 
 /// The image, from the root of the repository.
@@ -92,6 +93,18 @@ pub fn svg(root: &Path) -> Result<String, String> {
     all.sort_by(|a, b| a.tight_mm().total_cmp(&b.tight_mm()).then_with(|| a.name.cmp(&b.name)));
     let label = "D over its limit, over the closing of the pads from first contact, for each soft asset";
     Ok(PANELS.svg(label, &all.iter().map(Calibrated::panel).collect::<Vec<_>>()))
+}
+
+/// The plots of single assets, by their paths from the root of the repository.
+///
+/// # Errors
+/// A calibration that cannot be read.
+#[allow(dead_code, reason = "a test draws the image alone")]
+pub fn plots(root: &Path) -> Result<Vec<(String, String)>, String> {
+    let plot = |of: &Calibrated| {
+        (format!("{FOLDER}/{}.svg", of.name), envelope_plot(&of.name, &of.envelope, Some(of.limit)))
+    };
+    Ok(calibrations(root)?.iter().map(plot).collect())
 }
 
 fn calibrations(root: &Path) -> Result<Vec<Calibrated>, String> {

@@ -51,9 +51,9 @@ impl<'a, T: ?Sized> Column<'a, T> {
 /// use softvt_common::table::{Column, Table};
 ///
 /// let rows = [("cup", 1.25), ("bun", 0.5)];
-/// let columns =
-///     [Column::text("task", |row: &(&str, f64)| row.0.to_owned()), Column::number("D, %", |row| format!("{:.2}", row.1))];
-/// assert_eq!(Table::new(&rows, columns).text(), "task  D, %\ncup   1.25\nbun   0.50\n");
+/// let task = Column::text("task", |(task, _): &(&str, f64)| (*task).to_owned());
+/// let d = Column::number("D, %", |(_, d): &(&str, f64)| format!("{d:.2}"));
+/// assert_eq!(Table::new(&rows, [task, d]).text(), "task  D, %\ncup   1.25\nbun   0.50\n");
 /// ```
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Table {

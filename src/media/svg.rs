@@ -7,7 +7,7 @@ use super::{
 
 /// A whole image. `label` says what it shows.
 pub fn image(width: f32, height: f32, font_size: f32, label: &str, elements: &[Element]) -> String {
-    let contents = contents(elements, font_size);
+    let contents: String = elements.iter().map(|element| shown(element, font_size)).collect();
     format!(
         "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {width} {height}\" role=\"img\" \
          font-family=\"system-ui, sans-serif\" font-size=\"{font_size}\">\n<title>{}</title>\n<style>{}</style>\n\
@@ -17,11 +17,6 @@ pub fn image(width: f32, height: f32, font_size: f32, label: &str, elements: &[E
         escaped(label),
         style()
     )
-}
-
-/// Elements within an image.
-pub fn contents(elements: &[Element], font_size: f32) -> String {
-    elements.iter().map(|element| shown(element, font_size)).collect()
 }
 
 /// The style sheet of an image. It has no variables, which many programs other than browsers do not read.

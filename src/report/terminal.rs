@@ -43,7 +43,7 @@ pub fn table(summary: &SuiteSummary, format: TerminalFormat) -> String {
     let episodes = counted(scores.episodes, "episode");
     let title = format!("{} · {} · {episodes}", summary.suite, summary.method_label());
     text.line(Emphasis::Bold, shortened(&title, format.width - 1));
-    push_categories(&mut text, scores);
+    push_categories(&mut text, scores, format.width - 1);
     text.end();
     push_rate(&mut text, "Goal", scores.goal_success_rate, EpisodeCategory::Safe).end();
     push_safety(&mut text, scores);
@@ -57,11 +57,12 @@ pub fn table(summary: &SuiteSummary, format: TerminalFormat) -> String {
     text.into_text()
 }
 
-/// The number of episodes of each category that occurs. Rigid objects have no limit to be within.
-fn push_categories(text: &mut StyledText, scores: &GroupScores) {
+/// The number of episodes of each category that occurs, in lines of at most `width` characters. Rigid objects have no
+/// limit to be within.
+fn push_categories(text: &mut StyledText, scores: &GroupScores, width: usize) {
     let counts = EpisodeCategory::ALL.map(|category| (category, scores.count(category)));
-    for (at, (category, count)) in counts.into_iter().filter(|(_, count)| *count > 0).enumerate() {
-        let gap = if at > 0 { "  " } else { "" };
+    let mut length = 0;
+    for (category, count) in counts.into_iter().filter(|(_, count)| *count > 0) {
         let name = match (category, scores.is_soft()) {
             (EpisodeCategory::Safe, false) => "placed without a drop",
             _ => category.name(),
@@ -71,6 +72,12 @@ fn push_categories(text: &mut StyledText, scores: &GroupScores) {
             _ => String::new(),
         };
         let part = format!("{} {count} {name}{crushed}", category.glyph());
+        if length > 0 && length + 2 + part.chars().count() > width {
+            text.end();
+            length = 0;
+        }
+        let gap = if length > 0 { "  " } else { "" };
+        length += gap.len() + part.chars().count();
         text.push(Emphasis::None, gap).push(Emphasis::Category(category), part);
     }
     text.end();
@@ -114,7 +121,7 @@ fn push_safety(text: &mut StyledText, scores: &GroupScores) {
         let harm = match scores.crushed_over_limit {
             0 => "placed over the limit".to_owned(),
             crushed if crushed == over => "placed, but crushed".to_owned(),
-            crushed => format!("placed over the limit, {crushed} of {over} crushed"),
+            crushed => format!("placed, {crushed} of {over} crushed"),
         };
         let category = Emphasis::Category(EpisodeCategory::OverLimit);
         text.push(Emphasis::None, "  ").push(category, format!("gap {gap:.0} points: {harm}"));

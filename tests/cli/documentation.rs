@@ -237,7 +237,10 @@ fn the_pictures_of_committed_results_are_current() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     let calibration = calibration_picture::svg(root).expect("calibrations");
     assert_eq!(
-        (calibration.matches("<polyline").count(), calibration.matches("class=\"pressed\"").count()),
+        (
+            calibration.matches("class=\"curve safe\"").count(),
+            calibration.matches("class=\"hatched\"").count()
+        ),
         (17, 1)
     );
     for (path, drawn) in [

@@ -1,13 +1,12 @@
 //! Charts as wide as the page allows: places are in percent of the width, so that text does not shrink on narrow
 //! screens.
 
-use maud::{Markup, PreEscaped, html};
+use maud::{Markup, html};
 
 use softvt_media::{
     axis::Axis,
     chart::{Chart, FONT_SIZE, Frame},
     drawing::{Area, Element, Place, Symbol, Tone},
-    svg,
 };
 
 /// Room for the title of a chart, the labels of its horizontal axis, and the title of that, pixels.
@@ -26,8 +25,9 @@ pub(super) fn fluid_chart(chart: &Chart, height: f32) -> Markup {
     let names = chart.names(&frame);
     html! {
         svg.plot width="100%" height=(area.bottom + below) aria-hidden="true" {
-            @for element in chart.contents(&frame) { (shown(&element)) }
-            @if !names.is_empty() { svg x="100%" { (PreEscaped(svg::contents(&names, FONT_SIZE))) } }
+            @for element in chart.contents(&frame) { (shown(&element, percent)) }
+            // Places of names are in pixels from the right edge.
+            @if !names.is_empty() { svg x="100%" aria-hidden="true" { @for name in &names { (shown(name, px)) } } }
         }
     }
 }
@@ -39,11 +39,11 @@ pub(super) fn percent_axis(intervals: usize) -> Axis {
     axis
 }
 
-fn x(share: f32) -> String {
+fn percent(share: f32) -> String {
     format!("{:.2}%", 100.0 * share)
 }
 
-fn y(at: f32) -> String {
+fn px(at: f32) -> String {
     format!("{at:.1}")
 }
 
@@ -57,27 +57,28 @@ fn symbol_class(Symbol { tone, radius, .. }: &Symbol) -> &'static str {
     }
 }
 
-fn shown(element: &Element) -> Markup {
+/// An element whose places from the left are written by `x`.
+fn shown(element: &Element, x: fn(f32) -> String) -> Markup {
     html! {
         @match element {
             Element::Line(places, stroke) => {
                 g class=(stroke.class()) {
                     @for pair in places.windows(2) {
-                        line x1=(x(pair[0].x)) y1=(y(pair[0].y)) x2=(x(pair[1].x)) y2=(y(pair[1].y)) {}
+                        line x1=(x(pair[0].x)) y1=(px(pair[0].y)) x2=(x(pair[1].x)) y2=(px(pair[1].y)) {}
                     }
                 }
             }
             Element::Area(area, fill) => {
-                rect class=(fill.class()) x=(x(area.left)) width=(x(area.width())) y=(y(area.top)) height=(y(area.height())) {}
+                rect class=(fill.class()) x=(x(area.left)) width=(x(area.width())) y=(px(area.top)) height=(px(area.height())) {}
             }
             Element::Symbol(place, symbol) => {
-                circle class=(symbol_class(symbol)) cx=(x(place.x)) cy=(y(place.y)) r=(symbol.radius) {}
+                circle class=(symbol_class(symbol)) cx=(x(place.x)) cy=(px(place.y)) r=(symbol.radius) {}
             }
             Element::Text { place: Place { x: left, y: top }, shift, anchor, text, .. } => {
-                text.tick x=(x(*left)) y=(y(*top)) dx=(shift) text-anchor=(anchor.name()) { (text) }
+                text.tick x=(x(*left)) y=(px(*top)) dx=(shift) text-anchor=(anchor.name()) { (text) }
             }
             Element::Tag { place: Place { x: left, y: top }, shift, text, .. } => {
-                text.tick x=(x(*left)) y=(y(top + FONT_SIZE)) dx=(shift) { (text) }
+                text.tick x=(x(*left)) y=(px(top + FONT_SIZE)) dx=(shift) { (text) }
             }
         }
     }
