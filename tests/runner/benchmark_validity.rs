@@ -10,7 +10,7 @@ use crate::support::{Project, Run, spatial_soft, spatial_soft_run};
 /// The episodes of the expert under a change.
 fn changed(change: impl FnOnce(Run) -> Run) -> Vec<EpisodeRecord> {
     let project = Project::new(&[]);
-    change(spatial_soft_run(&project, "expert")).records()
+    change(spatial_soft_run(&project, "expert")).out("run").records()
 }
 
 fn all(episodes: &[EpisodeRecord], is_so: impl Fn(&Verdict) -> bool) -> bool {

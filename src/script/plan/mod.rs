@@ -127,7 +127,9 @@ impl LoadedScript {
     /// # Errors
     /// As [`load`].
     pub fn warnings(&self) -> Result<Vec<String>, ScriptError> {
-        let ScriptInstance { vm, .. } = self.sources.instance()?;
+        // The result of the script stays alive, since shapes that its functions hold are not unused.
+        let instance = self.sources.instance()?;
+        let vm = &instance.vm;
         let unused = UnusedShapes::lines(&vm.lua).map_err(|e| vm.explain(&e))?.into_iter().map(|line| {
             format!("{line}: makes a shape that is not used; the methods of a shape return a new one: shape = shape:translate(…)")
         });
