@@ -67,8 +67,9 @@ pub(crate) struct ViewArgs {
 /// # Errors
 /// The script is not a suite, the task or episode fails, or a file cannot be rendered or written.
 pub(super) fn run(args: ViewArgs) -> Result<(), CliError> {
-    let config = RunConfig { tasks: vec![args.task.clone()], ..args.script.clone().config()? };
-    let ConfiguredScript { config, script: loaded } = config.load()?;
+    let ConfiguredScript { config, script: loaded } = args.script.clone().config()?.load()?;
+    // Set after loading: a script of another kind is refused for what it is, not for the default task.
+    let config = RunConfig { tasks: vec![args.task.clone()], ..config };
     let policies = args.policies.load()?;
     let Plan::Suite(suite) = &loaded.plan else {
         let message = "expected a single suite; name a file that returns softvt.suite";
