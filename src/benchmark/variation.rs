@@ -47,8 +47,8 @@ impl FactorRange {
 /// measurements of Cornford, Axford and Elton (1964) and Scanlon, Sapirstein and Fahloul (2000).
 const STALING_EXPONENT: f64 = 0.7;
 
-/// Largest share of its limit that an instance may deform by its own weight when it is carried. Beyond it no grip is
-/// reliably safe.
+/// Largest share of its limit that an instance may deform by its own weight when it is carried. Beyond it no
+/// grip is reliably safe.
 const MAX_CARRIED: f64 = 0.5;
 
 /// Draws of an object before its ranges count as empty.

@@ -227,8 +227,8 @@ impl ComparedPolicyArgs {
     /// Loads the policies; the expert if none is named. Policies of one name get the number of their flag.
     ///
     /// # Errors
-    /// Too many policies, one named twice, a name for several, an option that none of them takes, or a policy that
-    /// cannot be loaded.
+    /// Too many policies, one named twice, a name for several, an option that none of them takes, or a policy
+    /// that cannot be loaded.
     pub(crate) fn load(&self) -> Result<Vec<PolicyConfig>, CliError> {
         let (options, count) = (self.connection.options(), self.policies.len());
         if count > Self::MAX_POLICIES {
@@ -297,8 +297,8 @@ impl PolicyArgs {
         PolicyOptions { policy, ..self.options() }
     }
 
-    /// The grip code that exports of a recording use. Policies that are neither servers nor in Lua have none of their
-    /// own.
+    /// The grip code that exports of a recording use. Policies that are neither servers nor in Lua have
+    /// none of their own.
     pub(crate) fn take_export_code(&mut self) -> Option<GripCode> {
         let has_code = matches!(self.policy, Some(PolicySource::Server(_) | PolicySource::Lua(_)));
         let gripper = &mut self.connection.profile.gripper;

@@ -14,8 +14,8 @@ pub(crate) const OFF: &str = "SOFTVT_NO_CACHE";
 /// Largest size of the cache, bytes.
 pub(crate) const LIMIT: u64 = 1 << 30;
 
-/// The folder of the cache, by default the platform's for the user. `None` if it is switched off, or if there is no
-/// home folder.
+/// The folder of the cache, by default the platform's for the user. `None` if it is switched off, or if there
+/// is no home folder.
 pub(crate) fn folder() -> Option<PathBuf> {
     if is_off() {
         return None;

@@ -31,8 +31,8 @@ use softvt_runner::{
     replay::{DemoRef, DemoReplay},
 };
 
-/// Prints to standard output with control characters escaped. A closed pipe (`| head -1`) is accepted: the reader has
-/// what it wants.
+/// Prints to standard output with control characters escaped. A closed pipe (`| head -1`) is accepted: the reader
+/// has what it wants.
 ///
 /// # Errors
 /// The text cannot be written, for example to a full disk.

@@ -81,8 +81,8 @@ impl Range {
         self.usual_min > f64::NEG_INFINITY || self.usual_max < f64::INFINITY
     }
 
-    /// Describes a value outside of the usual range, and the unit prefix that would bring it inside. `None` for a usual
-    /// value.
+    /// Describes a value outside of the usual range, and the unit prefix that would bring it inside. `None`
+    /// for a usual value.
     pub fn unusual(&self, value: f64, unit: &str) -> Option<String> {
         /// Kilo and milli, centimetres and percent.
         const FACTORS: [f64; 4] = [1e3, 1e-3, 1e-2, 1e2];

@@ -280,8 +280,8 @@ impl Envelope {
         }
     }
 
-    /// The envelope that follows from the rows of this one, of which those that are not [intact](SweepRow::instability)
-    /// are not stable.
+    /// The envelope that follows from the rows of this one, of which those that are not
+    /// [intact](SweepRow::instability) are not stable.
     pub fn recomputed(&self, kappa: f64) -> Self {
         let Self { protocol, stable_strain, censored, holds, sweep, variants, .. } = self.clone();
         let is_stable = |row: &SweepRow| row.stable && row.instability().is_none();
@@ -394,8 +394,8 @@ fn carried_end(holds: &[HoldRow], d_pct: f64) -> Option<f64> {
     Some(width_between(pair[0], pair[1], d_pct))
 }
 
-/// Force per pad at a width in N, to six decimals, linear between the rows; `sweep` by decreasing width. `None` outside
-/// of the sweep.
+/// Force per pad at a width in N, to six decimals, linear between the rows; `sweep` by decreasing width. `None`
+/// outside of the sweep.
 pub fn force_at(sweep: &[SweepRow], width_mm: f64) -> Option<f64> {
     sweep.windows(2).find(|pair| pair[0].width_mm >= width_mm && pair[1].width_mm <= width_mm).map(|pair| {
         let step = pair[0].width_mm - pair[1].width_mm;
@@ -429,8 +429,8 @@ pub(crate) mod tests {
         }
     }
 
-    /// A press test of an object 50 mm wide that reaches its stable strain of 0.3 at 44.5 mm, and holds from `lower`
-    /// on.
+    /// A press test of an object 50 mm wide that reaches its stable strain of 0.3 at 44.5 mm, and holds from
+    /// `lower` on.
     pub(crate) fn scans(lower: f64) -> CalibrationMeasurements {
         let holds = [49.0, 48.0, 47.0, 46.0].map(|width| hold(width, if width <= lower { 5 } else { 2 }));
         let sweep = vec![

@@ -78,6 +78,6 @@ impl EpisodeCategory {
     }
 }
 
-/// Share of the volume beyond its collapse strain from which an object is called crushed, %. It is the share that
-/// defines D_ref.
+/// Share of the volume beyond its collapse strain from which an object is called crushed, %. It is the
+/// share that defines D_ref.
 pub const CRUSHED_PCT: f64 = 5.0;

@@ -121,8 +121,8 @@ impl Curve {
         Self { rows: rows.map(reduced).collect() }
     }
 
-    /// The value of `wanted` where `given` first reaches `at`, linear between rows and along the first or last two
-    /// beyond them.
+    /// The value of `wanted` where `given` first reaches `at`, linear between rows and along the first or
+    /// last two beyond them.
     fn read(&self, wanted: Quantity, given: Quantity, at: f64) -> Option<f64> {
         let of = |row: &VariantSweepRow, quantity| match quantity {
             Quantity::Strain => row.strain_p95,

@@ -1,8 +1,8 @@
 //! Charts: values over two axes, as elements of a drawing, which [`svg`] and [`canvas`](super::canvas) show.
 //!
 //! Written by hand: the crate `plotters` (0.3.7 was tried) rounds places to whole pixels, writes colours as numbers, so
-//! that an image has one ground, and draws text on pixels with a typeface that has to be registered in the process. Both
-//! of its back ends would have to be replaced, and its ticks, bands and names at curves as well.
+//! that an image has one ground, and draws text on pixels with a typeface that has to be registered in the process.
+//! Both of its back ends would have to be replaced, and its ticks, bands and names at curves as well.
 
 use super::{
     axis::Axis,
@@ -246,8 +246,8 @@ impl Chart {
         }
     }
 
-    /// The names of the curves beside their last points, moved apart where they would overlap; x is from the right edge
-    /// of the area.
+    /// The names of the curves beside their last points, moved apart where they would overlap; x is from the right
+    /// edge of the area.
     pub fn names(&self, frame: &Frame) -> Vec<Element> {
         let named = self.marks.iter().filter_map(|mark| match mark {
             Mark::Curve(curve) if !curve.name.is_empty() => {

@@ -144,8 +144,8 @@ struct Connection<'a> {
 }
 
 impl<'a> HttpRequest<'a> {
-    /// Reads the line and the headers of a request. `None` if the client does not send them; malformed ones are
-    /// answered here.
+    /// Reads the line and the headers of a request. `None` if the client does not send them; malformed
+    /// ones are answered here.
     fn read(stream: TcpStream, cancel: &'a CancelFlag) -> Option<Self> {
         stream.set_nonblocking(false).ok()?;
         let stream = PollingStream::new(stream).ok()?;

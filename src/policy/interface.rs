@@ -63,8 +63,8 @@ impl Action {
         Pose::from_parts(self.position_b.into(), rotation::from_axis_angle(&self.axis_angle_b))
     }
 
-    /// All numbers of the action: those of [`Self::to_array`], and the grip force and the joint positions if it
-    /// commands them.
+    /// All numbers of the action: those of [`Self::to_array`], and the grip force and the joint positions
+    /// if it commands them.
     pub fn numbers(self) -> impl Iterator<Item = f64> {
         self.to_array().into_iter().chain(self.force_n()).chain(self.joints.into_iter().flatten())
     }

@@ -45,8 +45,8 @@ pub struct Observation {
     pub prompt: String,
     /// Images of the requested cameras, in the order of [`SensorStreams::cameras`].
     pub cameras: Vec<Arc<CameraImage>>,
-    /// The last [`SensorStreams::past_steps`] control steps before this one, oldest first; fewer at the start of an
-    /// episode.
+    /// The last [`SensorStreams::past_steps`] control steps before this one, oldest first; fewer at the
+    /// start of an episode.
     pub past: Vec<PastStep>,
     /// Tactile images and markers of the last control steps, if requested.
     pub tactile: Option<TactileHistory>,
@@ -76,8 +76,8 @@ pub struct CameraImage {
     pub image: RgbImage,
     /// Depth along the optical axis, m, height × width, if requested; infinite in the background.
     pub depth: Option<Vec<f32>>,
-    /// Object at each pixel, height × width, if requested: its number in the scene, from 1; 0 in the background, 1000
-    /// for the robot.
+    /// Object at each pixel, height × width, if requested: its number in the scene, from 1; 0 in the background,
+    /// 1000 for the robot.
     pub segmentation: Option<Vec<u16>>,
 }
 

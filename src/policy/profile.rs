@@ -132,8 +132,8 @@ pub struct ActionEncoding {
     /// Conversion of the first numbers to the units of `pose`, if they differ.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub units: Option<ActionUnits>,
-    /// Required length of an action including padding. `None` accepts that without padding, and 32 as openpi's models
-    /// pad them.
+    /// Required length of an action including padding. `None` accepts that without padding, and 32 as
+    /// openpi's models pad them.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub length: Option<usize>,
 }
@@ -329,9 +329,9 @@ impl GripperValues {
         }
     }
 
-    /// Closure of a value, 0 (open) ..= 1 (closed). A value is clamped to its range, but one that is beyond it by more
-    /// than a tenth is likely a mistake: its closure is outside of 0..=1, the episode counts it, and the hand clamps
-    /// it.
+    /// Closure of a value, 0 (open) ..= 1 (closed). A value is clamped to its range, but one that is beyond it
+    /// by more than a tenth is likely a mistake: its closure is outside of 0..=1, the episode counts it, and
+    /// the hand clamps it.
     pub fn closure(&self, value: f64) -> f64 {
         let share = (value - self.open) / (self.closed - self.open);
         let is_mistake = !(-GRIP_OVERSHOOT..=1.0 + GRIP_OVERSHOOT).contains(&share);
@@ -347,8 +347,8 @@ impl GripperValues {
         }
     }
 
-    /// The same values in another code. `None` if the codes have no values in common: a force says nothing about a
-    /// closure.
+    /// The same values in another code. `None` if the codes have no values in common: a force says
+    /// nothing about a closure.
     pub fn with_code(self, code: GripCode) -> Option<Self> {
         match (self.code, code) {
             (own, code) if own == code => Some(self),

@@ -59,8 +59,8 @@ fn worst_episode(records: &[EpisodeRecord]) -> Option<&EpisodeRecord> {
     over.or_else(|| EpisodeCategory::ALL.into_iter().skip(1).find_map(|category| of(category).next()))
 }
 
-/// The path of a file of a run from the working folder: the path itself, or that in the folder in which the run was
-/// made.
+/// The path of a file of a run from the working folder: the path itself, or that in the folder in which
+/// the run was made.
 fn located(path: &str, folder: Option<&str>) -> String {
     let stored = folder.map(|folder| Path::new(folder).join(path));
     match stored.filter(|stored| !Path::new(path).exists() && stored.exists()) {

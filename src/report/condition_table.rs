@@ -105,8 +105,8 @@ pub struct ConditionTable {
     pub rows: Vec<ConditionRow>,
 }
 
-/// A suite under conditions: one row per condition with its change from the reference. With details also all paired
-/// differences.
+/// A suite under conditions: one row per condition with its change from the reference. With details
+/// also all paired differences.
 pub fn table(suite: &ConditionTable, format: TerminalFormat) -> String {
     let mut text = StyledText::new(format);
     let conditions = counted(suite.rows.len().saturating_sub(1), "condition");

@@ -226,8 +226,8 @@ impl AssetCache {
         Self { entries: Arc::new(entries), approximate: false }
     }
 
-    /// The same values, with masses and contact samples that are approximate: for scenes that are checked, and at most
-    /// settle.
+    /// The same values, with masses and contact samples that are approximate: for scenes that are checked,
+    /// and at most settle.
     #[must_use]
     pub fn approximate(&self) -> Self {
         Self { approximate: true, ..self.clone() }

@@ -60,8 +60,8 @@ pub enum SceneBuildError {
         second_at: String,
         /// Penetration depth, m.
         depth: f64,
-        /// Distance from the origin of the first object to the lowest point of its shape, m, if that explains the
-        /// overlap.
+        /// Distance from the origin of the first object to the lowest point of its shape, m, if
+        /// that explains the overlap.
         below_origin: Option<f64>,
     },
     /// An object overlaps the base of the robot.

@@ -26,8 +26,8 @@ use softvt_physics::{
 use softvt_robot::gripper::target_width;
 use softvt_scene::{Body, SoftMaterial};
 
-/// Collects the evidence of an episode: the targets, the places of the goal, the other movable objects, and their
-/// settled shapes.
+/// Collects the evidence of an episode: the targets, the places of the goal, the other movable objects,
+/// and their settled shapes.
 #[derive(Clone, Debug)]
 pub(super) struct EvidenceCollector {
     goal: GoalInScene,

@@ -80,12 +80,12 @@ struct Finder<'a> {
 }
 
 impl GoalInScene {
-    /// The goal of a task. The scene need not have settled. `functions` are those of its [`Goal::Predicate`]s, in
-    /// order.
+    /// The goal of a task. The scene need not have settled. `functions` are those of its
+    /// [`Goal::Predicate`]s, in order.
     ///
     /// # Errors
-    /// The goal names an unknown object, a container without a cavity or something without a joint, or gravity does not
-    /// point down.
+    /// The goal names an unknown object, a container without a cavity or something without a joint, or gravity
+    /// does not point down.
     pub(super) fn find(
         task: &Task,
         sim: &Simulation,
@@ -299,8 +299,8 @@ impl Finder<'_> {
         Err(EpisodeError::JointRange { task: self.task.id, name: name.to_owned(), lower, upper, placed_at })
     }
 
-    /// The subject for a joint in the range that `range` derives from its limits. A range that includes a limit is open
-    /// at it.
+    /// The subject for a joint in the range that `range` derives from its limits. A range that includes a limit
+    /// is open at it.
     fn joint(&self, name: &str, range: impl Fn([f64; 2]) -> [f64; 2]) -> Result<Subject, EpisodeError> {
         let (part, limits) = self.part(name)?;
         let [low, high] = range(limits);
@@ -333,8 +333,8 @@ pub struct GoalAtStart {
 /// Checks the goal of a task in a scene that need not have settled.
 ///
 /// # Errors
-/// The goal names an unknown object, a container without a cavity or something without a joint, or gravity does not
-/// point down.
+/// The goal names an unknown object, a container without a cavity or something without a joint, or gravity
+/// does not point down.
 pub fn check_goal(
     task: &Task,
     sim: &Simulation,

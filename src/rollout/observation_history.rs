@@ -27,8 +27,8 @@ struct HistoryEntry {
 #[derive(Clone, Debug, Default)]
 pub(super) struct ObservationHistory {
     entries: VecDeque<HistoryEntry>,
-    /// Number of states whose observation had an image from inside an object. A state that is observed again counts
-    /// once.
+    /// Number of states whose observation had an image from inside an object. A state that is
+    /// observed again counts once.
     pub camera_inside: u32,
 }
 

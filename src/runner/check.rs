@@ -38,8 +38,8 @@ impl<'a> SuiteChecker<'a> {
     /// objects. Nothing is rendered.
     ///
     /// # Errors
-    /// A setting, a scene, a sensor or a calibration file that is not valid; an object that does not come to rest; a
-    /// request to stop.
+    /// A setting, a scene, a sensor or a calibration file that is not valid; an object that does not come to rest;
+    /// a request to stop.
     pub fn check(&self, suite: &Suite, episodes: u32, mut warn: impl FnMut(String)) -> Result<(), RunError> {
         self.config.observer.work(&format!("checking {}", suite.name));
         let tasks: Vec<&Task> = suite.tasks.iter().collect();

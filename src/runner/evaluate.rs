@@ -271,8 +271,8 @@ pub(crate) fn run_suite(
     Ok(SuiteResult { folder: Some(run.out.clone()), summary: log.summary(), records: log.records })
 }
 
-/// Runs the episodes of a prepared suite and writes nothing. Calls `on_episode` for each, in the order in which they
-/// end.
+/// Runs the episodes of a prepared suite and writes nothing. Calls `on_episode` for each, in the order
+/// in which they end.
 ///
 /// # Errors
 /// A script or policy fails, or a request to stop.
@@ -349,9 +349,9 @@ pub(crate) fn episode_line(record: &EpisodeRecord) -> String {
     line
 }
 
-/// Restores requested files of finished episodes that are missing: by the recorded actions, or without these by the
-/// policy unless it is in another program. Files that cannot be restored are reported; the results of their episodes
-/// stay.
+/// Restores requested files of finished episodes that are missing: by the recorded actions, or without
+/// these by the policy unless it is in another program. Files that cannot be restored are reported; the
+/// results of their episodes stay.
 ///
 /// # Errors
 /// An episode cannot be run, or a file cannot be written.

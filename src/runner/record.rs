@@ -46,8 +46,8 @@ impl DemoCount {
 /// number of episodes, the shard, the trace and the videos of the configuration are ignored.
 ///
 /// # Errors
-/// The script has no suite, the folder contains something else, an attempt or a file fails, or too few attempts are
-/// good.
+/// The script has no suite, the folder contains something else, an attempt or a file fails, or too
+/// few attempts are good.
 pub fn record(
     ConfiguredScript { config, script }: &ConfiguredScript,
     policy_of: impl Fn(Teacher) -> PolicyOptions,

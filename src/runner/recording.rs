@@ -106,8 +106,8 @@ impl RecordingOptions {
 }
 
 impl<'a> SuiteRecording<'a> {
-    /// Prepares a recording of at most the attempts `jobs`. `customize` gives the run its controllers, which record the
-    /// intent to grip.
+    /// Prepares a recording of at most the attempts `jobs`. `customize` gives the run its controllers, which record
+    /// the intent to grip.
     ///
     /// # Errors
     /// A setting or scene that is not valid, or a secret seed.

@@ -105,9 +105,9 @@ impl<'a> ServedRuns<'a> {
         served.add(finished).map_err(|error| self.fail(error))
     }
 
-    /// Sorts the episodes of the folders. A folder without an episode or attempt is removed, so that the same command
-    /// works again. Returns the results of the others, and why the server ended: a file that could not be written, or
-    /// an interrupt.
+    /// Sorts the episodes of the folders. A folder without an episode or attempt is removed, so that the same
+    /// command works again. Returns the results of the others, and why the server ended: a file that could not be
+    /// written, or an interrupt.
     pub fn finish(self) -> (Vec<SuiteSummary>, Result<(), RunError>) {
         let (config, failure) = (self.config, lock(&self.failure).take());
         let (mut recorded, mut requested, mut summaries) = (0, 0, Vec::new());

@@ -19,9 +19,9 @@ use softvt_runs::{
     stored_run::StoredRun,
 };
 
-/// Makes the folder of a run the working folder, unless its script is in the present one. Returns the path of the run
-/// from the working folder. A run that has its scripts needs no folder, unless a file of `--vary` replaced its
-/// variation.
+/// Makes the folder of a run the working folder, unless its script is in the present one. Returns the path
+/// of the run from the working folder. A run that has its scripts needs no folder, unless a file of
+/// `--vary` replaced its variation.
 ///
 /// # Errors
 /// The script is in none of the folders.

@@ -42,8 +42,8 @@ const FALLEN_DEG: f64 = 45.0;
 
 /// A suite with everything that its episodes need: [`SuiteRun::run_episode`] runs single episodes.
 ///
-/// [`SuiteRun::prepare`] checks the scenes and reads the limits. A [`Runner`](super::Runner) does that and runs all
-/// episodes.
+/// [`SuiteRun::prepare`] checks the scenes and reads the limits. A [`Runner`](super::Runner) does that
+/// and runs all episodes.
 pub struct SuiteRun<'a> {
     /// Configuration of the run.
     pub config: &'a RunConfig,
@@ -332,8 +332,8 @@ impl<'a> SuiteRun<'a> {
     /// [`Episode::run_watched`] does.
     ///
     /// # Errors
-    /// The script or the controller does not start. The inner result: the scene is not valid, or the episode or `watch`
-    /// fails.
+    /// The script or the controller does not start. The inner result: the scene is not valid, or the episode or
+    /// `watch` fails.
     pub(crate) fn simulate(
         &self,
         job: EpisodeJob<'_>,
@@ -509,8 +509,8 @@ impl<'a> SuiteRun<'a> {
         friction_warnings(&opened.scene, &opened.nominal, variation, self.settings.robot.pads.static_mu)
     }
 
-    /// Refuses shifts that change neither the scene nor the prompt of any task, unless their values are the nominal
-    /// ones.
+    /// Refuses shifts that change neither the scene nor the prompt of any task, unless their values
+    /// are the nominal ones.
     pub(crate) fn refuse_shifts_without_effect(&self) -> Result<(), RunError> {
         let is_nominal = |shift: &ShiftValue| {
             let declared = self.suite.shifts.iter().find(|declared| declared.name == shift.name);

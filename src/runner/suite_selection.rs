@@ -133,8 +133,8 @@ pub fn next_run_dir(config: &RunConfig, name: &str) -> PathBuf {
         .unwrap_or_default()
 }
 
-/// Checks that every suite has the episodes that are to become videos, and that recorded actions cover all of its
-/// episodes.
+/// Checks that every suite has the episodes that are to become videos, and that recorded actions cover
+/// all of its episodes.
 ///
 /// # Errors
 /// The first suite that lacks an episode.

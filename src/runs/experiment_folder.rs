@@ -51,12 +51,12 @@ pub struct ExperimentFolder {
 }
 
 impl ExperimentFolder {
-    /// Creates the folder, or with `resume` opens that of the same experiment, and returns its finished points by
-    /// number.
+    /// Creates the folder, or with `resume` opens that of the same experiment, and returns its
+    /// finished points by number.
     ///
     /// # Errors
-    /// It holds another experiment or something else, another process uses it, a line is not a point, or the system
-    /// refuses.
+    /// It holds another experiment or something else, another process uses it, a line is not a point,
+    /// or the system refuses.
     pub fn open(
         dir: &Path,
         manifest: &ExperimentManifest,

@@ -1,10 +1,10 @@
 //! Runs: their folders and what is in them, and what follows from many episodes.
 //!
 //! [`manifest::RunManifest`] is `run.json`. A [`run_folder::RunFolder`] is written while a run is in progress, and
-//! [`stored_run::StoredRun`] reads it. [`record::EpisodeRecord`] is one line of `episodes.jsonl`, with the verdict of the
-//! judge; [`record_line`] adds its digest. [`actions`] are the recorded actions of an episode. [`summary::SuiteSummary`]
-//! has the rates of a run, [`paired_stats`] compares two runs episode by episode, and a [`requirement::Requirement`] is a
-//! condition on the rates.
+//! [`stored_run::StoredRun`] reads it. [`record::EpisodeRecord`] is one line of `episodes.jsonl`, with the verdict of
+//! the judge; [`record_line`] adds its digest. [`actions`] are the recorded actions of an episode.
+//! [`summary::SuiteSummary`] has the rates of a run, [`paired_stats`] compares two runs episode by episode, and a
+//! [`requirement::Requirement`] is a condition on the rates.
 #![warn(missing_docs, unreachable_pub)]
 
 pub mod actions;

@@ -259,8 +259,8 @@ impl RunManifest {
         Self::read(dir).is_ok_and(|stored| stored.identity() == self.identity())
     }
 
-    /// Keys about the conditions of a run in which two runs of one suite differ, with the names of differing files and
-    /// limits in brackets.
+    /// Keys about the conditions of a run in which two runs of one suite differ, with the names of differing files
+    /// and limits in brackets.
     pub fn differing_conditions(&self, other: &Self) -> Vec<String> {
         let differs = [
             ("softvt", self.softvt != other.softvt),

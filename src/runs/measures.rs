@@ -139,7 +139,8 @@ impl<'a> Episodes<'a> {
         names.into_iter().map(of).collect()
     }
 
-    /// Share of all episodes that are valid and pass a test, with an interval by the bootstrap for a measure of success.
+    /// Share of all episodes that are valid and pass a test, with an interval by the bootstrap for
+    /// a measure of success.
     fn rate(&self, test: fn(&EpisodeRecord) -> bool, group: MeasureGroup) -> Rate {
         let succeeds = |r: &&EpisodeRecord| r.outcome.is_valid() && test(r);
         let rate = Rate::from_test(self.records, succeeds);
@@ -206,8 +207,8 @@ impl Aggregate for Success {
     }
 }
 
-/// A success that needs the limits of soft targets, and of rigid ones nothing. Not judged where all targets are soft and
-/// none was judged; compared over soft targets.
+/// A success that needs the limits of soft targets, and of rigid ones nothing. Not judged where all targets are soft
+/// and none was judged; compared over soft targets.
 struct SafeSuccess(fn(&EpisodeRecord) -> bool);
 
 impl Aggregate for SafeSuccess {
@@ -352,8 +353,8 @@ macro_rules! measures {
             pub invalid: usize,
             /// Number of valid episodes whose safety could not be judged, for lack of a threshold or of evidence.
             pub safety_unknown: usize,
-            /// Number of episodes with a soft target whose deformation was not judged, for lack of a limit or of
-            /// evidence.
+            /// Number of episodes with a soft target whose deformation was not judged, for lack of a
+            /// limit or of evidence.
             pub not_judged: usize,
             $($(#[doc = $about] pub $summary: measures!(@type $kind),)?)*
             /// Goal Success minus Safety Success, percentage points.

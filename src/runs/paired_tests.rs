@@ -8,8 +8,8 @@ use std::f64::consts::LN_2;
 /// Largest number of pairs whose signed ranks are counted exactly; more use the normal approximation.
 const MAX_EXACT_RANKS: usize = 200;
 
-/// Exact two-sided p-value of McNemar's test (Psychometrika 12, 1947): `better` against `worse` under equal
-/// probabilities.
+/// Exact two-sided p-value of McNemar's test (Psychometrika 12, 1947): `better` against
+/// `worse` under equal probabilities.
 pub fn mcnemar(better: usize, worse: usize) -> f64 {
     let n = better + worse;
     let tail: f64 = (0..=better.min(worse)).map(|k| (ln_choose(n, k) - n as f64 * LN_2).exp()).sum();
@@ -61,8 +61,8 @@ fn exact_tail(ranks: &[usize], smaller: usize) -> f64 {
     probability.iter().sum()
 }
 
-/// Both tails beyond `smaller` of the normal distribution with the moments of the sum, with a correction for
-/// continuity.
+/// Both tails beyond `smaller` of the normal distribution with the moments of the sum, with
+/// a correction for continuity.
 fn normal_tails(ranks: &[usize], smaller: usize) -> f64 {
     let mean = 0.5 * ranks.iter().sum::<usize>() as f64;
     let variance = 0.25 * ranks.iter().map(|rank| (rank * rank) as f64).sum::<f64>();
@@ -73,8 +73,8 @@ fn normal_tails(ranks: &[usize], smaller: usize) -> f64 {
 /// What a number of episodes can separate of two policies that run the same ones, in percentage points of a rate.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DetectableDifference {
-    /// Smallest difference that can be significant at 5 %: that of [`MIN_DISCORDANT`] episodes, which one policy alone
-    /// wins.
+    /// Smallest difference that can be significant at 5 %: that of [`MIN_DISCORDANT`] episodes, which
+    /// one policy alone wins.
     pub smallest: f64,
     /// Difference that McNemar's test finds with a probability of 80 % (Connor, Biometrics 43, 1987), for outcomes that
     /// are independent and as frequent as that of the run.

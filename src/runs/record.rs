@@ -182,9 +182,8 @@ pub struct RolloutStats {
     /// Number of observations with an image of a camera that was inside an object; it shows the
     /// scene beyond that object.
     pub camera_inside: u32,
-    /// Number of control steps whose command was farther from the tool than one step of the inverse kinematics
-    /// reaches (0.2 m, 0.6 rad), or had a joint position outside of its limits: out of reach, or in the wrong frame or
-    /// unit.
+    /// Number of control steps whose command was farther from the tool than one step of the inverse kinematics reaches
+    /// (0.2 m, 0.6 rad), or had a joint position outside of its limits: out of reach, or in the wrong frame or unit.
     pub far_commands: u32,
     /// The first of them.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -192,8 +191,8 @@ pub struct RolloutStats {
     /// Number of control steps whose grip value was outside of its range, and was clamped: for decoded answers of
     /// policies by more than a tenth of the range.
     pub clamped_grips: u32,
-    /// Number of control steps whose displacement was beyond −1..=1 by more than a tenth of that range, and was
-    /// clamped.
+    /// Number of control steps whose displacement was beyond −1..=1 by more than a tenth of that
+    /// range, and was clamped.
     #[serde(default, skip_serializing_if = "is_zero")]
     pub clamped_steps: u32,
     /// Number of attempts at the episode, of a policy outside of softvt that ended earlier ones or was interrupted;

@@ -1,7 +1,8 @@
 //! A line of `episodes.jsonl`: the record of an episode, and its SHA-256 as the last key.
 //!
-//! The digest is of the bytes before the comma in front of its key. It finds a line that was changed or damaged. It does
-//! not prove that the simulation gave the record: whoever changes a line can compute a new digest. A replay proves that.
+//! The digest is of the bytes before the comma in front of its key. It finds a line that was changed or damaged. It
+//! does not prove that the simulation gave the record: whoever changes a line can compute a new digest. A replay proves
+//! that.
 
 use std::path::Path;
 

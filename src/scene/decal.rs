@@ -190,8 +190,8 @@ fn scale_of(font: &FontRef) -> PxScale {
     PxScale::from(CAPITAL / capital(font))
 }
 
-/// Calls `place` with each letter of a line and the place where it begins, texels, from `start` on. Returns where the
-/// line ends.
+/// Calls `place` with each letter of a line and the place where it begins, texels, from `start` on. Returns
+/// where the line ends.
 fn place_letters(line: &LabelLine, font: &FontRef, start: f32, mut place: impl FnMut(GlyphId, f32)) -> f32 {
     let scaled = font.as_scaled(scale_of(font));
     let thick = line.weight as f32 * CAPITAL;

@@ -67,8 +67,8 @@ pub use scale::LENGTH_HINT;
 pub use variation::{CameraVariation, HiddenProperties, LightVariation, ObjectVariation, SceneVariation};
 pub use visual::{Mask, Visual, VisualLayer};
 
-/// Largest number of objects of a scene, and of bodies that are drawn, among them the parts of articulated objects and
-/// of the robot.
+/// Largest number of objects of a scene, and of bodies that are drawn, among them the parts of articulated objects
+/// and of the robot.
 pub const MAX_OBJECTS: usize = 1000;
 /// Segmentation id of the robot. Objects have ids from 1 in the order of the scene, each followed by its parts.
 pub const ROBOT_SEGMENTATION_ID: u16 = 1000;

@@ -96,8 +96,8 @@ impl<'a> Attempts<'a> {
         }
     }
 
-    /// Ends the client's `own` attempt at an episode, or rules out a later one of any client, which counts as an
-    /// attempt.
+    /// Ends the client's `own` attempt at an episode, or rules out a later one of any client, which
+    /// counts as an attempt.
     ///
     /// # Errors
     /// As [`Self::check_free`], or the recorder fails.

@@ -16,8 +16,8 @@ pub(super) struct RenderBudget {
 }
 
 impl RenderBudget {
-    /// Waits until an image of so many pixels fits. A larger one than the limit is rendered alone. `None` if the server
-    /// is cancelled.
+    /// Waits until an image of so many pixels fits. A larger one than the limit is rendered alone. `None` if
+    /// the server is cancelled.
     pub(super) fn acquire(&self, pixels: usize, cancel: &CancelFlag) -> Option<RenderPermit<'_>> {
         let pixels = pixels.min(MAX_RENDER_PIXELS);
         let mut in_use = self.in_use.lock().unwrap_or_else(PoisonError::into_inner);

@@ -33,8 +33,8 @@ pub(super) struct ClientSession<'a> {
 }
 
 impl<'a> ClientSession<'a> {
-    /// A session without an episode. Its images wait for `render_budget`; `attempts` are those of all clients; `cancel`
-    /// interrupts long requests.
+    /// A session without an episode. Its images wait for `render_budget`; `attempts` are those of all clients;
+    /// `cancel` interrupts long requests.
     pub(super) fn new(
         config: &'a ServerConfig<'a>,
         render_budget: &'a RenderBudget,

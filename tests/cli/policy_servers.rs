@@ -10,8 +10,8 @@ use tungstenite::{Message, WebSocket, accept};
 
 use crate::support::{Project, Small, client::array};
 
-/// Starts a server that answers every observation with twelve actions of these numbers, and states its grip code.
-/// Returns its address.
+/// Starts a server that answers every observation with twelve actions of these numbers, and states its grip
+/// code. Returns its address.
 fn server(code: &'static str, action: [f64; 7]) -> String {
     quitting(code, action, 0)
 }

@@ -1,5 +1,5 @@
--- Soft cubes of two assets on a shelf, for which calibrations are written by the fingerprints that the plan `who` returns.
--- The layout `drawn` places one of the two, and the layout `changed` runs a CHANGE on a cube.
+-- Soft cubes of two assets on a shelf, for which calibrations are written by the fingerprints that the plan `who`
+-- returns. The layout `drawn` places one of the two, and the layout `changed` runs a CHANGE on a cube.
 local solids = require "solids"
 local function asset(name, edge)
   return softvt.asset {

@@ -2,8 +2,8 @@
 //!
 //! What is above the line `---` is common to the inputs below it, which blank lines separate. `...` in it stands for an
 //! input; without it, an input follows. What is in front of an input is joined to one line, so that its own lines start
-//! with 2, or with 1 without it. A line `-- NAME: VALUE` gives a property of the input, and a line `-- file: PATH` starts
-//! another file, common or of the input.
+//! with 2, or with 1 without it. A line `-- NAME: VALUE` gives a property of the input, and a line `-- file: PATH`
+//! starts another file, common or of the input.
 //!
 //! A new input is a new paragraph. `INSTA_UPDATE=always cargo test …` writes the snapshots; review what it changes.
 
@@ -26,8 +26,8 @@ pub(super) struct Input {
     pub(super) files: Vec<(String, String)>,
 }
 
-/// Compares the answers to the inputs of every file in `folder` with the snapshot of the file. `answer` gets the name of
-/// the file, too.
+/// Compares the answers to the inputs of every file in `folder` with the snapshot of the file. `answer` gets the name
+/// of the file, too.
 pub(super) fn check(folder: &Path, answer: impl Fn(&str, &Input) -> String) {
     let mut settings = insta::Settings::clone_current();
     settings.set_snapshot_path(folder);

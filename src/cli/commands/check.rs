@@ -29,8 +29,8 @@ pub(crate) struct CheckArgs {
     episodes: Option<u32>,
 }
 
-/// Loads a script, builds the scenes of the first episodes of every task and lets their objects settle. Nothing is run
-/// or rendered.
+/// Loads a script, builds the scenes of the first episodes of every task and lets their objects settle. Nothing
+/// is run or rendered.
 ///
 /// # Errors
 /// The first thing that is not valid.

@@ -86,8 +86,8 @@ pub(super) fn report(args: &ReportArgs) -> Result<(), CliError> {
     Ok(())
 }
 
-/// Prints the paired differences of the runs in the second folder from those in the first, or the ranking of more
-/// folders.
+/// Prints the paired differences of the runs in the second folder from those in the first, or the
+/// ranking of more folders.
 ///
 /// # Errors
 /// A folder without a run or with two of one suite, or no common episode.

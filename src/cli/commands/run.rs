@@ -104,8 +104,8 @@ pub(super) fn run(args: RunArgs) -> Result<(), CliError> {
     }
 }
 
-/// Says on standard error what to do next: the report of the runs, and a view of the worst episode of the first run
-/// that has one.
+/// Says on standard error what to do next: the report of the runs, and a view of the worst episode of the first
+/// run that has one.
 fn print_next_commands(folders: &[PathBuf]) {
     let Some(parent) = folders.first().and_then(|folder| folder.parent()) else { return };
     let mut runs = folders.iter().filter_map(|folder| stored_run::load(folder).ok()).flatten().peekable();

@@ -1,9 +1,9 @@
 //! Checks of a dataset: that its files belong together, and that streams are as they were recorded, or at least as they
 //! are declared.
 //!
-//! The digest of a stream shows every change after the recording. Streams without one, of earlier versions or written by
-//! other programs, are checked for type, shape and range. What a digest cannot show, that the numbers follow from the
-//! commands, a re-simulation does.
+//! The digest of a stream shows every change after the recording. Streams without one, of earlier versions or written
+//! by other programs, are checked for type, shape and range. What a digest cannot show, that the numbers follow from
+//! the commands, a re-simulation does.
 
 use std::{
     collections::{BTreeMap, BTreeSet},

@@ -226,8 +226,8 @@ fn binary_stl_files_are_known_by_their_bytes_and_may_count_too_few_triangles() {
     }
 }
 
-/// A cube whose triangles share no vertices, each of which is off by up to `offset` along every axis, with texture
-/// coordinates.
+/// A cube whose triangles share no vertices, each of which is off by up to `offset` along every
+/// axis, with texture coordinates.
 fn cracked(offset: f64, seed: u64) -> Mesh {
     let cube = read_obj(CUBE).expect("a cube");
     let mut rng = ChaCha8Rng::seed_from_u64(seed);

@@ -195,9 +195,9 @@ impl PolicyConnection {
         }
     }
 
-    /// Checks that the server sent nothing after its last reply: sends a ping and waits for its pong. Frames keep their
-    /// order, so a message sent before the pong arrives before it. A connection that the server closed meanwhile
-    /// passes.
+    /// Checks that the server sent nothing after its last reply: sends a ping and waits for its pong.
+    /// Frames keep their order, so a message sent before the pong arrives before it. A connection that the
+    /// server closed meanwhile passes.
     ///
     /// # Errors
     /// The server sent a message, or no pong until `deadline`.
@@ -321,8 +321,8 @@ fn connect(
     }
 }
 
-/// Connects in a thread, since neither a name's resolution nor a connection attempt can be interrupted. The thread ends
-/// by itself.
+/// Connects in a thread, since neither a name's resolution nor a connection attempt can be interrupted. The
+/// thread ends by itself.
 fn connect_tcp(server: &PolicyServer, deadline: Instant) -> Result<TcpStream, ConnectError> {
     let (sender, receiver) = mpsc::channel();
     let url = server.url.clone();

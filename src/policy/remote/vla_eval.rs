@@ -43,8 +43,8 @@ pub(super) fn greet(connection: &mut PolicyConnection, deadline: Instant) -> Res
     }
 }
 
-/// Checks what the entry `action_spec` of a server states of its actions, in the words of vla-eval's specs. Unknown
-/// formats pass.
+/// Checks what the entry `action_spec` of a server states of its actions, in the words of vla-eval's
+/// specs. Unknown formats pass.
 ///
 /// # Errors
 /// It contradicts the profile.

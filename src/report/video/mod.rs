@@ -278,8 +278,8 @@ impl SharedSensors {
     }
 }
 
-/// Writes a picture of an episode as a PNG file: the state that shows its result best, with the final verdict and the
-/// whole curves.
+/// Writes a picture of an episode as a PNG file: the state that shows its result best, with the final verdict
+/// and the whole curves.
 ///
 /// # Errors
 /// The state cannot be rendered, or the file cannot be written.
@@ -362,8 +362,8 @@ impl<'a> VideoContext<'a> {
         Ok(())
     }
 
-    /// Draws the images of the fingers with the motion of their markers, and below them the change since the settled
-    /// state.
+    /// Draws the images of the fingers with the motion of their markers, and below them the change
+    /// since the settled state.
     fn draw_fingers(
         &self,
         canvas: &mut Canvas,

@@ -238,10 +238,10 @@ fn shows_nothing(camera: &Camera, objects: &[&Object], cache: &AssetCache) -> Op
 /// Coefficients that differ by less are equal.
 const ROUNDING: f64 = 1e-9;
 
-/// Warnings about free objects whose static friction acts in no contact, since a pair of surfaces takes the larger coefficient
-/// and all that holds or carries them has a larger one: `pads_mu` and those of fixed objects. Of a drawn friction, the
-/// largest that can be drawn counts. Of one that is lower than in the `nominal` scene, the pads alone count, since grips
-/// are no looser than without the change.
+/// Warnings about free objects whose static friction acts in no contact, since a pair of surfaces takes the larger
+/// coefficient and all that holds or carries them has a larger one: `pads_mu` and those of fixed objects. Of a drawn
+/// friction, the largest that can be drawn counts. Of one that is lower than in the `nominal` scene, the pads alone
+/// count, since grips are no looser than without the change.
 pub fn friction_warnings(
     scene: &Scene,
     nominal: &Scene,

@@ -78,8 +78,8 @@ fn cut_text(mask: &Mask, shapes: &[&Shape]) -> Option<String> {
     }
 }
 
-/// True if an end of a line of text is beside a shape as its reader sees it, or a wrapped line is longer than its
-/// circle.
+/// True if an end of a line of text is beside a shape as its reader sees it, or a wrapped line is
+/// longer than its circle.
 fn is_cut(line: &LabelLine, shape: &Shape) -> bool {
     let length = line.length_m();
     if let Some(radius) = line.wrap_m {

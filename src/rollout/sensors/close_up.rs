@@ -105,8 +105,8 @@ impl Sensors {
         Camera { near_m, ..close_up_camera(object, frame, edge, distance) }
     }
 
-    /// Renders what a camera with the hand at the world's origin sees, with colours at the nodes of soft bodies, if
-    /// there are any.
+    /// Renders what a camera with the hand at the world's origin sees, with colours at the nodes of soft bodies,
+    /// if there are any.
     fn without_robot(
         &mut self,
         frame: &WorldSnapshot,
@@ -171,8 +171,8 @@ impl Mask {
         Self((0..edge * edge).map(is_set).collect())
     }
 
-    /// The pixels on both sides of the border of the set, and of the edges that `has_edge` says are between two
-    /// neighbours.
+    /// The pixels on both sides of the border of the set, and of the edges that `has_edge` says
+    /// are between two neighbours.
     fn outline(&self, has_edge: impl Fn(usize, usize) -> bool) -> Self {
         let edge = self.0.len().isqrt();
         let mut outline = vec![false; self.0.len()];
@@ -245,8 +245,8 @@ fn patch_mask(patch: &ContactPatch, pad_w: &Pose, camera: &Camera, depth: &[f32]
 
 /// Direction from the object to the camera of a close-up, world.
 const CLOSE_UP_FROM: [f64; 3] = [0.8, -0.45, 0.5];
-/// Field of view of a close-up, rad, and its distance from the object, in diagonals of its bounds; a portrait is
-/// closer.
+/// Field of view of a close-up, rad, and its distance from the object, in diagonals of its bounds;
+/// a portrait is closer.
 const CLOSE_UP_FOVY: f64 = 0.5;
 const CLOSE_UP_DISTANCE: f64 = 2.6;
 const PORTRAIT_DISTANCE: f64 = 1.9;

@@ -240,8 +240,8 @@ impl PolicyConfig {
         matches!(self.expert(), Some(ExpertGrip::Blind(grip)) if grip.is_constant_number())
     }
 
-    /// True for a policy whose answers need not be the same in another attempt at an episode: one in another program,
-    /// or in Rust.
+    /// True for a policy whose answers need not be the same in another attempt at an episode: one in another
+    /// program, or in Rust.
     pub(crate) fn is_outside(&self) -> bool {
         matches!(self.kind, PolicyKind::Server(_) | PolicyKind::Client(_) | PolicyKind::Rust(_))
     }

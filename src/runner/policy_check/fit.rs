@@ -44,8 +44,8 @@ const METRE: Unit = Unit { name: "m", offset: 0.02, residual: 0.01 };
 const RADIAN: Unit = Unit { name: "rad", offset: 0.087, residual: 0.105 };
 const CLOSURE: Unit = Unit { name: "closure", offset: 0.25, residual: 0.25 };
 
-/// The affine map from the demonstrations to one channel of the answers. Offset and residual are in the unit of the
-/// channel.
+/// The affine map from the demonstrations to one channel of the answers. Offset and residual are in the
+/// unit of the channel.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ChannelFit {
     /// Channel of the answers.

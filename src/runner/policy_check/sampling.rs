@@ -65,8 +65,8 @@ struct PendingCommand {
     closure: Option<f64>,
 }
 
-/// A controller that asks a policy, compares its answers with the recorded steps of one demonstration, and executes the
-/// recorded actions.
+/// A controller that asks a policy, compares its answers with the recorded steps of one demonstration, and
+/// executes the recorded actions.
 pub struct AnswerComparison {
     policy: Box<dyn Policy>,
     brief: Option<EpisodeBrief>,

@@ -51,8 +51,8 @@ record_of! {
         resolution: usize = Type::Integer(SoftMaterial::RESOLUTION) => Integer(6);
         /// Spacing of contact samples where a gripper can reach.
         grasp_spacing: f64 = Type::Number("m", SoftMaterial::GRASP_SPACING_M) => Number(0.00075);
-        /// Compressive strain at which cell walls buckle and a plateau of stress begins; a calibration presses no
-        /// further.
+        /// Compressive strain at which cell walls buckle and a plateau of stress begins; a
+        /// calibration presses no further.
         collapse_strain: Option<f64> = STRAIN;
         /// Compressive strain that leaves a visible crack or set.
         damage_strain: Option<f64> = STRAIN;
@@ -97,8 +97,8 @@ record! {
         friction: Friction;
         /// Visuals by material id of the shape, from 0; by default the colours of its mesh file, or plain grey.
         visuals: Vec<Visual> => Empty;
-        /// Numbers for experts (grasp height …). Those whose names end in _m are lengths, which follow an object's
-        /// scale.
+        /// Numbers for experts (grasp height …). Those whose names end in _m are lengths, which follow an
+        /// object's scale.
         hints: BTreeMap<String, f64> => Empty;
     }
 }

@@ -365,8 +365,8 @@ functions! {
             }
             envelope_table(lua, &asset, &envelope, &file)?
         }
-        /// Returns the content of assets/calibration/<asset>.json as softvt.envelope does; nil if there is no such
-        /// file.
+        /// Returns the content of assets/calibration/<asset>.json as softvt.envelope does; nil if there
+        /// is no such file.
         fn calibration(lua, asset: String = Type::Name) -> ["softvt.Envelope?"] {
             let label = "softvt.calibration";
             check_privilege(lua, label)?;

@@ -290,9 +290,9 @@ const CLOSURE: Type = Type::Number("", Range::closed(0.0, 1.0));
 /// Rate of the gripper, up to the speed of its fingers (robot.gripper.speed, 0.2 m/s each): faster commands would end
 /// before the hand has moved. Below the lowest rate the whole stroke takes more than a quarter of an hour.
 const RATE: Type = Type::Number("1/s", Range::closed(1e-3, 5.0));
-/// Largest speed and angular speed of the tool, m/s and rad/s: four times the limits of the real arm (Franka Control
-/// Interface documentation, Robot and interface specifications: Cartesian space limits). Above them, the unit is likely
-/// wrong.
+/// Largest speed and angular speed of the tool, m/s and rad/s: four times the limits of the real arm (Franka
+/// Control Interface documentation, Robot and interface specifications: Cartesian space limits). Above them, the
+/// unit is likely wrong.
 const MAX_SPEED: f64 = 6.8;
 const MAX_ANGULAR_SPEED: f64 = 10.0;
 
@@ -378,8 +378,8 @@ class! {
             /// Name of the controller that takes the place of the expert's own grip, such as "size-seen" under --policy
             /// size-seen (experts.blind_grips). nil under policies that have none.
             grip_controller: "string?" { get(_, this) { this.read(|view| view.grip_controller.map(str::to_owned)) } }
-            /// With a grip_controller, which must not know the instance: the instances that the suite can draw. nil
-            /// without.
+            /// With a grip_controller, which must not know the instance: the instances that the suite can
+            /// draw. nil without.
             instances: "softvt.Instances?" {
                 get(lua, this) {
                     let instances = this.read(|view| view.instances.clone());
@@ -475,9 +475,9 @@ class! {
             fn kinds(_, this) -> ["string[]"] {
                 this.kinds()?.iter().map(|kind| kind.name.clone()).collect::<Vec<_>>()
             }
-            /// Returns instances of the asset of an object in the scene, or of a kind, drawn as the suite draws them,
-            /// from a random stream that no episode uses: the same in every episode. Without a variation each is the
-            /// asset itself.
+            /// Returns instances of the asset of an object in the scene, or of a kind, drawn as the suite draws
+            /// them, from a random stream that no episode uses: the same in every episode. Without a variation each
+            /// is the asset itself.
             fn sample(
                 lua,
                 this,

@@ -86,8 +86,8 @@ record! {
         /// Lowest and highest value, rad of a hinge and m of a slider.
         range: [f64; 2] = Type::Interval("rad or m", ANGLES);
     }
-    /// The centres of two objects are near each other in the horizontal plane, and the robot does not touch the object,
-    /// for a time.
+    /// The centres of two objects are near each other in the horizontal plane, and the robot does not touch the
+    /// object, for a time.
     NearSpec: "softvt.Near" as "task.goal", constructor "softvt.near" {
         /// Scene name of the object.
         object: String;
@@ -98,8 +98,8 @@ record! {
         /// Time that it must stay there.
         hold_s: f64 = HOLD => Number(0.4);
     }
-    /// The object is beside the target, within 45° of a direction of the robot's base, and the robot does not touch it,
-    /// for a time.
+    /// The object is beside the target, within 45° of a direction of the robot's base, and the robot does not touch
+    /// it, for a time.
     BesideSpec: "softvt.Beside" as "task.goal", constructor "softvt.beside" {
         /// Side of the target: "left_of" (+y of the base), "right_of", "in_front_of" (nearer to the robot, −x) or
         /// "behind".

@@ -127,8 +127,8 @@ pub(crate) fn path_beside(mesh_file: &str, name: &str) -> Result<String, String>
     Ok(parts.join("/"))
 }
 
-/// Largest width and height of an image that is kept, pixels: surfaces are drawn with fewer texels. Larger ones are
-/// scaled down.
+/// Largest width and height of an image that is kept, pixels: surfaces are drawn with fewer texels. Larger
+/// ones are scaled down.
 const KEPT_EDGE: u32 = 2048;
 
 /// Memory of the images of one mesh file, bytes.

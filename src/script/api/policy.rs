@@ -28,13 +28,13 @@ record! {
         reset: Option<Function> = Type::Function("fun(task: softvt.EpisodeBrief)");
         /// Returns the action of this control step, or a list of actions for the next ones.
         act: Function = Type::Function("fun(obs: softvt.Observation): softvt.Action|softvt.Action[]");
-        /// Number of actions of a list that are executed before act is called again, unless --replan gives another; all
-        /// by default.
+        /// Number of actions of a list that are executed before act is called again, unless --replan gives
+        /// another; all by default.
         replan: Option<usize> = Type::Integer(Range::closed(1.0, MAX_CHUNK_LEN as f64));
         /// Grip code, which says what the closure of an action commands, unless --gripper gives another: a closure
-        /// (continuous); open, or above 0.5 closed with the whole effort (binary); open, or the width given just after
-        /// closing (two-width). For force, actions have force. By default an action has closure, which is continuous,
-        /// or force.
+        /// (continuous); open, or above 0.5 closed with the whole effort (binary); open, or the width given just
+        /// after closing (two-width). For force, actions have force. By default an action has closure, which is
+        /// continuous, or force.
         gripper: Option<GripCode>;
         /// True to let the policy use limits and materials of objects: softvt.calibration, assets, and the modules
         /// strain_sources and experts. Its results say that it is privileged.
@@ -71,9 +71,9 @@ record! {
         /// For camera, depth and segmentation: true to rotate the image by 180°.
         half_turn: Option<bool>;
         /// For state: its parts in order, in m, rad, rad/s and N m, of 3 numbers (position, axis_angle), 4
-        /// (quaternions), 7 (joints, joint_velocities, joint_torques), 2 (finger_pair) and 1. The sensed width has the
-        /// steps and the offset of a real hand; the gap between the exact one and the commanded closure is the grip
-        /// force.
+        /// (quaternions), 7 (joints, joint_velocities, joint_torques), 2 (finger_pair) and 1. The sensed width
+        /// has the steps and the offset of a real hand; the gap between the exact one and the commanded closure
+        /// is the grip force.
         parts: Option<Vec<StatePart>>;
         /// Number of control steps in the entry, the present one last, along a first axis; not for prompt and
         /// tactile_image. By default the present step without that axis, and 8 steps of marker_motion and force. The
@@ -101,8 +101,8 @@ record! {
         scale: Option<Vec<f64>> = Type::List(&Type::Number("", Range::ANY));
         /// Offsets added after that.
         offset: Option<Vec<f64>> = Type::List(&Type::Number("", Range::ANY));
-        /// Length that an action must have, padding included; by default 7, or 8 for joints, or 32 as openpi's models
-        /// pad them.
+        /// Length that an action must have, padding included; by default 7, or 8 for joints, or 32 as
+        /// openpi's models pad them.
         length: Option<usize> = Type::Integer(Range::closed(7.0, 4096.0));
         /// The number of the gripper.
         gripper: GripperValuesSpec;

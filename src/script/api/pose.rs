@@ -19,8 +19,8 @@ const FULL_TURN: f64 = 6.2832;
 const SHARE: Range = Range::closed(0.0, 1.0);
 const MAX_SHARE_ERROR: f64 = 1e-6;
 
-/// Divides the numbers by the largest magnitude, so that no square over- or underflows. `None` if that is too small or
-/// not finite.
+/// Divides the numbers by the largest magnitude, so that no square over- or underflows. `None` if that is too
+/// small or not finite.
 fn normalized_to_max<const N: usize>(numbers: [f64; N]) -> Option<[f64; N]> {
     let largest =
         numbers.iter().fold(0.0, |max: f64, x| if x.is_nan() { f64::NAN } else { max.max(x.abs()) });

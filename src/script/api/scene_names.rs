@@ -1,5 +1,5 @@
-//! Names of objects and joints in a scene: those of goals, and those of experts, which are checked in every scene before
-//! an episode begins.
+//! Names of objects and joints in a scene: those of goals, and those of experts, which are checked in every scene
+//! before an episode begins.
 
 use std::collections::BTreeMap;
 
@@ -38,9 +38,9 @@ functions! {
         /// Has the objects that an expert names checked in every scene in which its task runs, and returns the expert:
         /// `return softvt.check_names("nudge", run, spec, { object = "object" })`. The kinds of the fields of `spec`
         /// are "object" (one that moves), "place" (an object or a part), "joint" (a part, cabinet.top_drawer) and
-        /// "value of joint" (a number in the range of the joint that the field `joint` names). Experts in `spec` are
-        /// checked as well. softvt check reports a wrong name at the line of the file that called the function which
-        /// makes the expert.
+        /// "value of joint" (a number in the range of the joint that the field `joint` names). Experts in `spec`
+        /// are checked as well. softvt check reports a wrong name at the line of the file that called the function
+        /// which makes the expert.
         fn check_names(
             lua,
             label: String,

@@ -72,8 +72,8 @@ struct Node {
     _reserved: Reservation,
 }
 
-/// Lines of a script that made a shape which nothing read before it was dropped, such as the result of a method that
-/// was not kept.
+/// Lines of a script that made a shape which nothing read before it was dropped, such as the result of a method
+/// that was not kept.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct UnusedShapes(Arc<Mutex<BTreeSet<SourceLine>>>);
 

@@ -402,8 +402,8 @@ class! {
     LuaSimulation: "softvt.Simulation" {
         label(_) { "simulation".to_owned() }
         methods {
-            /// Runs an expert to its end. Returns false and the reason if it gave up, as for a pose out of reach, or
-            /// the physics failed.
+            /// Runs an expert to its end. Returns false and the reason if it gave up, as for a pose out of reach,
+            /// or the physics failed.
             fn drive(lua, this, expert: Function = EXPERT) -> ["boolean", "string?"] { this.drive(lua, expert)? }
             /// Holds the last command for a time. Returns false and the reason if the physics failed.
             fn wait(_, this, seconds: f64 = Type::Number("s", Range::closed(0.0, 600.0))) -> ["boolean", "string?"] {

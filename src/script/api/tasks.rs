@@ -64,8 +64,8 @@ record! {
         object: Option<String>;
         /// A coroutine that solves the task with privileged state.
         expert: Option<Function> = EXPERT;
-        /// Control steps (20 Hz) that the policy has; by default 500 in suites that vary layouts, 700 in those that
-        /// vary objects.
+        /// Control steps (20 Hz) that the policy has; by default 500 in suites that vary layouts, 700 in
+        /// those that vary objects.
         budget_steps: Option<u32> = Type::Integer(Range::closed(1.0, 100_000.0).usually(10.0, 20_000.0));
     }
     /// A change of the scene that a run can request with --shift name=value. Limits of D stay those of the assets.
@@ -81,13 +81,13 @@ record! {
         /// Highest value.
         max: Option<f64>;
         /// Changes the scene; may return another one. scene.goal_object is the object of the task's goal and
-        /// scene.prompt the instruction. Draw from rng:stream "camera", "light", "material" or "sensor", whichever the
-        /// shift changes.
+        /// scene.prompt the instruction. Draw from rng:stream "camera", "light", "material" or "sensor",
+        /// whichever the shift changes.
         apply: Function = Type::Function("fun(scene: softvt.Scene, value: number, rng: softvt.Rng): softvt.Scene?");
     }
-    /// Ranges from which every episode of a suite draws: factors on size, stiffness, density and friction of each soft
-    /// object, its colour, the light and the poses of the cameras. The policy sees none of the drawn numbers; records
-    /// do.
+    /// Ranges from which every episode of a suite draws: factors on size, stiffness, density and friction of each
+    /// soft object, its colour, the light and the poses of the cameras. The policy sees none of the drawn
+    /// numbers; records do.
     VariationSpec: "softvt.Variation" as "variation", constructor "softvt.variation" {
         /// Name in results.
         name: String = Type::Name;
@@ -117,13 +117,13 @@ record! {
     HiddenSpec: "softvt.Hidden" as "variation.hidden" {
         /// Relative density of the foam: a factor on the density, and by its square on Young's modulus.
         aeration: [f64; 2] = FACTORS;
-        /// Age: a factor on Young's modulus; the collapse and damage strains shrink by its power 0.7, and τ of the
-        /// instance with them.
+        /// Age: a factor on Young's modulus; the collapse and damage strains shrink by its power 0.7, and τ of
+        /// the instance with them.
         staling: [f64; 2] = FACTORS;
         /// Factor on the mass.
         filling: [f64; 2] = FACTORS;
-        /// Static friction of a coating (flour, oil, glaze), which acts between the object and everything that it
-        /// touches.
+        /// Static friction of a coating (flour, oil, glaze), which acts between the object and
+        /// everything that it touches.
         coating: [f64; 2] = COATINGS;
         /// Largest over smallest safe grip force of the instances that are kept, at least 1.
         window_ratio: [f64; 2] = Type::Interval("", Range::closed(1.0, 1000.0));

@@ -148,8 +148,8 @@ impl LuaType for Mask {
 }
 
 class! {
-    /// A weight between 0 and 1 at every point of a surface, for the layers of a visual. A mask never changes; methods
-    /// return new masks.
+    /// A weight between 0 and 1 at every point of a surface, for the layers of a visual. A mask never changes;
+    /// methods return new masks.
     LuaMask: "softvt.Mask" {
         label(_) { "mask".to_owned() }
         methods {
@@ -292,8 +292,8 @@ functions! {
         } -> ["softvt.Mask"] {
             LuaMask::simple(lua, Mask::Inside { shape: Arc::new(shape.copy()), soft_m })?
         }
-        /// The letters of a line of text, printed on surfaces that face the reader. Surfaces with text are drawn in
-        /// finer detail.
+        /// The letters of a line of text, printed on surfaces that face the reader. Surfaces with text are
+        /// drawn in finer detail.
         fn text(lua) takes spec "softvt.TextMask" {
             /// At most 64 letters.
             text: String;

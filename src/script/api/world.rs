@@ -73,8 +73,8 @@ record! {
 }
 
 output! {
-    /// Deformation of a body against its reference shape, in percent of the diagonal of its bounding box along its own
-    /// axes.
+    /// Deformation of a body against its reference shape, in percent of the diagonal of its bounding box
+    /// along its own axes.
     fn deformation_table(lua, deformation: &Deformation) -> "softvt.Deformation" as "deformation" {
         /// D: root mean square of the displacement over the volume.
         rms_pct: "number" = deformation.rms_pct;
@@ -352,8 +352,8 @@ class! {
             /// Adds a gel pad of the robot, with the shape and the default contact law of its fingers, on a carrier
             /// that solid:move_to moves. Its frame is at the apex of the gel, which faces along x.
             fn gel_pad(lua, this, spec: WorldGelPadSpec) -> ["softvt.Solid"] { this.add_gel_pad(lua, &spec)? }
-            /// Makes one time step. Returns false and the reason if the state is invalid then; a further step is an
-            /// error.
+            /// Makes one time step. Returns false and the reason if the state is invalid then; a further
+            /// step is an error.
             fn step(lua, this) -> ["boolean", "string?"] { this.step(lua)? }
             /// Returns the time step, s.
             fn dt(_, this) -> ["number"] { lock(&this.0).world.params.dt }

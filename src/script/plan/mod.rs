@@ -264,8 +264,8 @@ impl ScriptInstance {
         table.is_some_and(|table| is_constructed(&self.vm.lua, record, table))
     }
 
-    /// The result of the main file if the constructor of `T` made it, checked again, since a script may have written to
-    /// it.
+    /// The result of the main file if the constructor of `T` made it, checked again, since a script may
+    /// have written to it.
     pub(crate) fn result<T: RecordType>(&self) -> mlua::Result<Option<Constructed<T>>> {
         match &self.result {
             Some(table) if self.returned(T::RECORD) => {
@@ -326,8 +326,8 @@ impl ScriptInstance {
         })
     }
 
-    /// The suites that the main file returned: one suite, conditions, or a list of suites. `None` if it is something
-    /// else.
+    /// The suites that the main file returned: one suite, conditions, or a list of suites. `None` if
+    /// it is something else.
     fn suites(&self) -> mlua::Result<Option<Vec<Constructed<SuiteSpec>>>> {
         if let Some(suite) = self.result()? {
             return Ok(Some(vec![suite]));

@@ -89,8 +89,8 @@ impl EpisodeSetup {
         SceneBuilder::open(loaded)?.build(id, changes)
     }
 
-    /// True if the shifts change the scene or the prompt. Rounding of camera poses does not count, nor do source
-    /// locations.
+    /// True if the shifts change the scene or the prompt. Rounding of camera poses does not count,
+    /// nor do source locations.
     pub fn is_shifted(&self) -> bool {
         let mut scene = self.scene.clone();
         for (camera, nominal) in scene.cameras.iter_mut().zip(&self.nominal.cameras) {

@@ -101,8 +101,8 @@ impl Experiment {
         spec.ok_or_else(|| ScriptError::new(vm.main(), "the script did not return an experiment"))
     }
 
-    /// The rows of point `index`. `math.random` is seeded by the index and the base seed, so that the order of points
-    /// does not matter.
+    /// The rows of point `index`. `math.random` is seeded by the index and the base seed, so that the order of
+    /// points does not matter.
     ///
     /// # Errors
     /// If the script fails, takes too long, or returns something other than rows.

@@ -400,8 +400,8 @@ pub(crate) fn error_at_key(lua: &Lua, label: &str, error: &ValidationError) -> m
     error_at(lua, current_line(lua), label, error)
 }
 
-/// The error of a function of a script about a table that it was given, at the line of the file that called the
-/// function.
+/// The error of a function of a script about a table that it was given, at the line of the file
+/// that called the function.
 pub(crate) fn error_of_caller(lua: &Lua, label: &str, error: &ValidationError) -> mlua::Error {
     error_at(lua, caller_line(lua), label, error)
 }

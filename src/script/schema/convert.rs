@@ -177,8 +177,8 @@ macro_rules! first {
 }
 pub(crate) use first;
 
-/// The result of a conversion from its converted fields: the struct with fields of these names, or what a function
-/// makes of them.
+/// The result of a conversion from its converted fields: the struct with fields of these names, or what a
+/// function makes of them.
 macro_rules! made {
     ($lua:ident [$($field:ident)*]) => { Ok(Self { $($field),* }) };
     ($lua:ident [$($field:ident)*] $make:expr) => { $make($lua, $($field),*) };
@@ -219,9 +219,9 @@ pub(crate) use fields;
 /// ```
 ///
 /// The Lua type may be left out where [`LuaType`] of the Rust type says enough, and so may the default: an `Option` may
-/// then be absent, and a nested record of which every field has a default. Constructor and [`Relation`](super::Relation) are optional.
-/// Gives the struct with its conversion from a checked table ([`FromChecked`]) and the [`Record`] by which tables are
-/// checked.
+/// then be absent, and a nested record of which every field has a default. Constructor and
+/// [`Relation`](super::Relation) are optional. Gives the struct with its conversion from a checked table
+/// ([`FromChecked`]) and the [`Record`] by which tables are checked.
 macro_rules! record {
     ($(
         $(#[doc = $doc:literal])+

@@ -161,9 +161,9 @@ macro_rules! signature {
 }
 pub(crate) use signature;
 
-/// Declares a list of functions of the `softvt` table: `functions! { LIST { /// Documentation. fn name(lua, argument:
-/// RustType = Type::…) -> ["LuaCATS type"] { … } } }`. As the methods of [`class!`](super::class), a function can take
-/// a table.
+/// Declares a list of functions of the `softvt` table: `functions! { LIST { /// Documentation. fn name(lua,
+/// argument: RustType = Type::…) -> ["LuaCATS type"] { … } } }`. As the methods of [`class!`](super::class), a
+/// function can take a table.
 macro_rules! functions {
     ($list:ident {$(
         $(#[doc = $doc:literal])+

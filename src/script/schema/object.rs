@@ -147,8 +147,8 @@ pub(crate) fn read_only_list<T: IntoLua>(
 /// Hint for lists of measured values.
 pub(crate) const MEASURED: &str = "it is measured";
 
-/// The object that a value holds. Arguments are checked before, so that another value is an error of the interface
-/// itself.
+/// The object that a value holds. Arguments are checked before, so that another value is an error
+/// of the interface itself.
 pub(crate) fn object_of<T: ApiObject>(lua: &Lua, value: &Value) -> mlua::Result<T> {
     let object = value.as_userdata().and_then(|data| data.borrow::<T>().ok().map(|object| object.clone()));
     object.ok_or_else(|| fail(lua, format!("expected a {}, got {}", T::NAME, describe(value))))

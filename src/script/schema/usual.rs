@@ -42,8 +42,8 @@ pub(crate) fn note_unusual(lua: &Lua, label: &str, ty: &Type, value: &Value) {
 }
 
 impl Type {
-    /// Describes the numbers in a checked value that are outside of their usual range. Tables that constructors made
-    /// are left out.
+    /// Describes the numbers in a checked value that are outside of their usual range. Tables that constructors
+    /// made are left out.
     fn unusual(&self, value: &Value) -> Vec<ValidationError> {
         let one = |unit: &str, range: &super::Range, value: &Value| {
             // The unit of a vector may name its frame as well.

@@ -209,8 +209,8 @@ impl Library {
         }
     }
 
-    /// True if a module has limits or materials of objects: by its path, and by its content, since a link or a copy may
-    /// have any name.
+    /// True if a module has limits or materials of objects: by its path, and by its content, since a link or a copy
+    /// may have any name.
     pub(crate) fn is_hidden(&mut self, file: &FoundFile) -> bool {
         if self.is_frozen || self.bundle.hidden.contains(&file.name) {
             return self.bundle.hidden.contains(&file.name);

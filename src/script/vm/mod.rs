@@ -57,8 +57,8 @@ pub struct VmLimits {
     pub memory_bytes: usize,
     /// Lua time to load a script and make its plan.
     pub load: Duration,
-    /// Lua time of one call: a layout, a shift, a control step of an expert. Physics that a binding runs is not
-    /// counted.
+    /// Lua time of one call: a layout, a shift, a control step of an expert. Physics that a binding
+    /// runs is not counted.
     pub call: Duration,
     /// Lua time of one point of an experiment, likewise.
     pub point: Duration,
@@ -462,8 +462,8 @@ fn record_raised_object(lua: &Lua, object: Value) -> mlua::Result<()> {
 pub(crate) struct MathRandom(Arc<Mutex<ChaCha8Rng>>);
 
 impl MathRandom {
-    /// Installs `math.random` with the same seed in every virtual machine, so that loading a script twice gives the
-    /// same plan.
+    /// Installs `math.random` with the same seed in every virtual machine, so that loading a script twice
+    /// gives the same plan.
     pub(crate) fn install(lua: &Lua) -> mlua::Result<Self> {
         let generator = Self(Arc::new(Mutex::new(seed::keyed_rng(&["softvt load"]))));
         let rng = generator.clone();

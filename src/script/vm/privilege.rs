@@ -42,8 +42,8 @@ impl PrivilegedAccess {
     /// Grants or refuses further access, as the policy has declared.
     ///
     /// # Errors
-    /// The policy declares itself not privileged, and its script has used privileged functions: the error of the first
-    /// use.
+    /// The policy declares itself not privileged, and its script has used privileged functions: the error
+    /// of the first use.
     pub(crate) fn declare(&self, is_privileged: bool) -> mlua::Result<()> {
         let decided = if is_privileged { Access::Granted } else { Access::Refused };
         match std::mem::replace(&mut *lock(&self.0), decided) {
@@ -95,8 +95,8 @@ pub(crate) fn check_module(lua: &Lua, name: &str, file: &FoundFile) -> mlua::Res
     if is_hidden { check_privilege(lua, &format!("require {name:?}")) } else { Ok(()) }
 }
 
-/// True if the Lua file at `path` has limits or materials of objects: assets, strains of materials, and the experts
-/// that use them.
+/// True if the Lua file at `path` has limits or materials of objects: assets, strains of materials, and the
+/// experts that use them.
 pub(crate) fn is_hidden_path(path: &Path) -> bool {
     let of_folder = |folder: &str| path.parent().is_some_and(|parent| parent.ends_with(folder));
     let stem = path.file_stem().and_then(|stem| stem.to_str());

@@ -73,8 +73,8 @@ pub(super) fn info(features: &[Column]) -> Value {
     Value::Object(features.iter().map(entry).collect())
 }
 
-/// Schema of the tables of rows. Their metadata are those that `datasets` expects: without them, images are read as
-/// bytes.
+/// Schema of the tables of rows. Their metadata are those that `datasets` expects: without them, images
+/// are read as bytes.
 pub(super) fn schema(features: &[Column]) -> TableSchema {
     let known: Map<String, Value> = features.iter().map(|f| (f.name.to_owned(), f.hugging_face())).collect();
     let text = json!({ "info": { "features": known } }).to_string();

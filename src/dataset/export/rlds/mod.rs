@@ -57,8 +57,8 @@ fn dataset_name(suites: &BTreeSet<&str>) -> String {
     }
 }
 
-/// The content of `dataset_info.json`: the message `DatasetInfo` of TensorFlow Datasets, whose 64-bit numbers are texts
-/// in JSON.
+/// The content of `dataset_info.json`: the message `DatasetInfo` of TensorFlow Datasets, whose 64-bit numbers
+/// are texts in JSON.
 fn info(name: &str, split: &Split) -> Value {
     let lengths: Vec<String> = split.shard_lengths.iter().map(usize::to_string).collect();
     json!({
