@@ -1,7 +1,7 @@
 //! The measures of episodes, each declared once: what it is of a record, how a summary aggregates it, how two runs are
 //! compared by it, and how tables show it.
 //!
-//! [`measures!`] makes [`GroupScores`], [`EpisodeDeformation`] and [`PairedComparison`] of the list, and [`MEASURES`],
+//! `measures!` makes [`GroupScores`], [`EpisodeDeformation`] and [`PairedComparison`] of the list, and [`MEASURES`],
 //! from which tables and the reference in `docs/results.md` are made. A row is
 //!
 //! ```text

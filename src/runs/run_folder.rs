@@ -1,8 +1,8 @@
 //! The folder of a run: `run.json`, `episodes.jsonl`, `summary.json` and the files of the episodes.
 //!
 //! The line of an episode is written and synced when the episode ends, after its other files: an episode with a line is
-//! complete. Each line ends with its digest ([`record_line`]). At the end of a run the lines are sorted by episode, so
-//! that the file's bytes depend neither on the number of threads nor on interruptions.
+//! complete. Each line ends with its digest ([`record_line`](super::record_line)). At the end of a run the lines are
+//! sorted by episode, so that the file's bytes depend neither on the number of threads nor on interruptions.
 
 use std::{
     collections::BTreeMap,
