@@ -150,17 +150,6 @@ class Studies(unittest.TestCase):
             with self.assertRaisesRegex(UserError, problem):
                 _study_of(given, self.out, [], 0)
 
-    def test_the_queue_in_the_documentation_is_valid(self):
-        text = (Path(__file__).parents[3] / "docs" / "baselines.md").read_text()
-        path = self.out / "missing.txt"
-        path.write_text(text.split("cat > missing.txt <<'END'\n")[1].split("END\n")[0])
-        suites = {file.stem for file in (Path(__file__).parents[3] / "suites").glob("*.lua")}
-        lines = study.read_queue(path)
-        self.assertEqual(len({name for name, *_ in lines}), len(lines), "each in a folder of its own")
-        for name, *words in lines:
-            given = _parser().parse_args(["study", *words, "--out", "."])
-            self.assertLessEqual({*_study_of(given, self.out / name, [], 0).suites}, suites)
-
     def test_a_queue_has_a_study_per_line(self):
         path = self.out / "queue"
         path.write_text("# First.\nsmall one two --seeds 0  # with one seed\n\nmore one\n")
