@@ -17,7 +17,7 @@ use softvt::{
     rollout::{AssetCache, Controller, Episode, StateRecording},
     scene::{Camera, CameraMount},
     script::LoadedScript,
-    sensing::camera::Renderer,
+    sensing::camera::{Channels, Renderer},
 };
 
 /// Repetitions, of which the fastest counts.
@@ -55,7 +55,9 @@ fn report(recording: &mut StateRecording, name: &str, goal_ms: f64, camera: &Cam
     let scene = recording.sensors.render_scene().expect("everything can be drawn");
     let mut draw = |state: usize| {
         let start = ThreadTime::now();
-        renderer.render_rgb(scene, &views[state], &camera).expect("the camera is good");
+        renderer
+            .render_channels(scene, &views[state], &camera, Channels::Colours)
+            .expect("the camera is good");
         1e3 * start.elapsed().as_secs_f64()
     };
     let first = draw(0);

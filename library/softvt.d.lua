@@ -6,11 +6,11 @@
 ---@field name string Name in results; part of the seed.
 ---@field object_type "deformable"|"rigid" Mechanics of the objects.
 ---@field tasks_differ_in "object"|"spatial" Difference between the tasks.
----@field needs? "nothing"|"size"|"trial" What a controller has to know of an instance to grip it safely, as softvt list suites prints it: "nothing" but its kind, its "size", or what only a "trial" tells. softvt scripts/blind_bounds.lua estimates it.
+---@field needs? "nothing"|"size"|"trial" Knowledge of an instance that a safe grip needs, as softvt list suites prints it: "nothing" but its kind, its "size", or what only a "trial" tells. softvt scripts/blind_bounds.lua estimates it.
 ---@field episodes? integer Default number of episodes per task. Expects a whole number in 1..1000000. Default 5.
 ---@field tasks softvt.Task[] The tasks, in order.
 ---@field shifts? softvt.Shift[] Changes of the scene that a run can request.
----@field metrics? softvt.Metric[] Numbers of each episode that records and tables show beside the verdict.
+---@field metrics? softvt.Metric[] Numbers of each episode that records and tables show in addition to the verdict.
 ---@field vary? softvt.Variation Ranges from which the soft objects, the light and the cameras of every episode are drawn.
 ---@field settings? softvt.Settings Changed settings (docs/settings.md): { physics = {…}, robot = {…}, criteria = {…}, tactile = {…}, cameras = {…} }.
 ---@field twin_of? string Name of the suite of soft objects whose rigid twin this is. All soft bodies become rigid, with the same shape, mass and looks; initial states are those of that suite, so tasks and layouts must be its own.
@@ -20,8 +20,8 @@
 ---@class softvt.Task
 ---@field prompt string Instruction for the policy, and name of the task in results.
 ---@field episode_prompt? fun(scene: softvt.Scene, rng: softvt.Rng): string Returns the prompt of an episode, given its initial scene: for prompts that name what was drawn, as the larger of two objects or the side of the plate. It must not change the scene. Shifts come after it.
----@field layout softvt.Layout Initial scene.
----@field goal softvt.Goal Success criterion.
+---@field layout softvt.Layout Layout of the initial scene.
+---@field goal softvt.Goal Success criterion of the task.
 ---@field object? string Scene name of the object whose deformation and grip the records hold; by default the first that the goal names. A goal of joints or functions alone needs it.
 ---@field expert? fun(arm: softvt.Arm, scene: softvt.SceneState) A coroutine that solves the task with privileged state.
 ---@field budget_steps? integer Control steps (20 Hz) that the policy has; by default 500 in suites that vary layouts, 700 in those that vary objects. Expects a whole number in 1..100000.
@@ -67,7 +67,7 @@
 ---@class softvt.Near
 ---@field object string Scene name of the object.
 ---@field target string Scene name of the target, or of a part of it.
----@field distance? number Largest distance. Expects metres in 0.001..1.5. Default 0.15.
+---@field distance? number Largest distance of the centres. Expects metres in 0.001..1.5. Default 0.15.
 ---@field hold_s? number Time that it must stay there. Expects seconds in 0..10. Default 0.4.
 
 ---The object is beside the target, within 45° of a direction of the robot's base, and the robot does not touch it, for a time.
@@ -86,20 +86,20 @@
 
 ---A function of the true scene returns true at the end of a control step. It must depend on its argument alone: variables that it changes are not part of the state of an episode.
 ---@class softvt.Predicate
----@field name string What holds, in words, as records and reports show it.
----@field holds fun(scene: softvt.SceneState): boolean The function.
+---@field name string Condition in words, for records and reports.
+---@field holds fun(scene: softvt.SceneState): boolean Returns true if the condition holds.
 
 ---All of these goals hold at once.
 ---@class softvt.All
----@field goals softvt.Goal[] The goals.
+---@field goals softvt.Goal[] Goals that must hold.
 
 ---At least one of these goals holds.
 ---@class softvt.Any
----@field goals softvt.Goal[] The goals.
+---@field goals softvt.Goal[] Goals of which one must hold.
 
 ---None of these goals holds.
 ---@class softvt.None
----@field goals softvt.Goal[] The goals.
+---@field goals softvt.Goal[] Goals that must not hold.
 
 ---Each of these goals has held once after the one before it had, and the last one holds.
 ---@class softvt.Sequence
@@ -110,19 +110,19 @@
 ---@field name string Name on the command line.
 ---@field unit? string Unit of the value. Default "1".
 ---@field default number Value that changes nothing. Expects a number.
----@field min? number Lowest value. Expects a number.
----@field max? number Highest value. Expects a number.
+---@field min? number Lowest value that is accepted. Expects a number.
+---@field max? number Highest value that is accepted. Expects a number.
 ---@field apply fun(scene: softvt.Scene, value: number, rng: softvt.Rng): softvt.Scene? Changes the scene; may return another one. scene.goal_object is the object of the task's goal and scene.prompt the instruction. Draw from rng:stream "camera", "light", "material" or "sensor", whichever the shift changes.
 
----A number of each episode, beside the verdict: of the true state, which policies do not see.
+---A number of each episode in addition to its verdict, from the true state, which policies do not see.
 ---@class softvt.Metric
 ---@field name string Name in records and tables, with its unit, as tilt_deg; none that records have already, as safety.
 ---@field of fun(scene: softvt.SceneState, step: table): number? Returns the value after a control step, or nil where it has none. `step` is a row of the trace (docs/results.md): forces of the pads, D of each object, what touches what.
----@field over? "last"|"max"|"min"|"mean" How the values of an episode become one: "last", "max", "min" or "mean". Default "last".
+---@field over? "last"|"max"|"min"|"mean" Reduction of the values of an episode: "last", "max", "min" or "mean". Default "last".
 
 ---Ranges from which every episode of a suite draws: factors on size, stiffness, density and friction of each soft object, its colour, the light and the poses of the cameras. The policy sees none of the drawn numbers; records do.
 ---@class softvt.Variation
----@field name string Name in results.
+---@field name string Name of the variation in results.
 ---@field size number[] Smallest and largest factor on the size of a soft object, uniform. Expects a list of 2 numbers in 0.1..10.
 ---@field stiffness number[] Factors on Young's modulus, log-uniform. Expects a list of 2 numbers in 0.1..10.
 ---@field density number[] Factors on the density, log-uniform. Expects a list of 2 numbers in 0.1..10.
@@ -143,7 +143,7 @@
 
 ---Runs suites as they are, then under each condition, and compares them episode by episode.
 ---@class softvt.Conditions
----@field name string Name in results.
+---@field name string Name of the plan in results.
 ---@field suites softvt.Suite[] The suites, in order.
 ---@field conditions softvt.Condition[] The conditions, in order.
 
@@ -158,19 +158,19 @@
 
 ---A function that is evaluated at points and returns rows of results. Give either grid or points.
 ---@class softvt.Experiment
----@field name string Name in results.
+---@field name string Name of the experiment in results.
 ---@field options? any Result of softvt.options, passed to the functions below as opt.
 ---@field grid? table<string, any[]> Values of each parameter. Every combination is run, names in alphabetical order, the last one fastest.
 ---@field points? fun(opt: table): table[] Returns the points instead of a grid.
 ---@field run fun(point: table, opt: table): table|table[] Returns a row, or a list of rows, for one point. Points run in any order and on several threads, each in a new run of the script: variables that one changes are not seen by others. Reading a field of the point that is no parameter of the grid, or a misspelt one of `points`, is an error.
----@field finish? fun(rows: table[], opt: table): softvt.Finish? Summarizes all rows.
+---@field finish? fun(rows: table[], opt: table): softvt.Finish? Summarizes the rows of all points.
 ---@field columns? string[] Columns of the table, in order; by default all, sorted.
 
 ---A kind of object. Its shape at rest has its lowest point at z = 0 and its centre on the z axis (see softvt.Shape:grounded).
 ---@class softvt.Asset
 ---@field name string Name in results and calibration files.
 ---@field shape softvt.Shape Shape, in metres.
----@field body softvt.Soft|softvt.Rigid|softvt.Articulated|softvt.Static|softvt.Scenery Mechanics.
+---@field body softvt.Soft|softvt.Rigid|softvt.Articulated|softvt.Static|softvt.Scenery Mechanics: soft, rigid, articulated, static or scenery.
 ---@field friction? softvt.Friction Friction of its surface.
 ---@field visuals? softvt.Visual[] Visuals by material id of the shape, from 0; by default the colours of its mesh file, or plain grey.
 ---@field hints? table<string, number> Numbers for experts (grasp height …). Those whose names end in _m are lengths, which follow an object's scale.
@@ -179,7 +179,7 @@
 ---@class softvt.Soft
 ---@field youngs_pa number Young's modulus. Expects pascals above 0.
 ---@field poisson number Poisson's ratio; 0.5 would be incompressible. Expects a number in 0..below 0.5.
----@field density number Density. Expects a number (kg/m³) above 0.
+---@field density number Density of the solid part. Expects a number (kg/m³) above 0.
 ---@field resolution? integer Voxels along the longest edge of the bounding box. Expects a whole number in 1..64. Default 6.
 ---@field grasp_spacing? number Spacing of contact samples where a gripper can reach. Expects metres in 0.0001..0.02. Default 0.00075.
 ---@field collapse_strain? number Compressive strain at which cell walls buckle and a plateau of stress begins; a calibration presses no further. Expects a number in above 0..1.
@@ -187,7 +187,7 @@
 
 ---A free rigid body of uniform density.
 ---@class softvt.Rigid
----@field density number Density. Expects a number (kg/m³) above 0.
+---@field density number Density of the whole volume. Expects a number (kg/m³) above 0.
 
 ---Parts on joints. The asset's own shape is their base, which never moves.
 ---@class softvt.Articulated
@@ -197,7 +197,7 @@
 ---@class softvt.Part
 ---@field name string Name, unique in the object. A scene names the part cabinet.top_drawer.
 ---@field shape softvt.Shape Shape with all joints at 0, in the frame of the whole object. Walls must be at least 4 mm thick.
----@field density number Density. Expects a number (kg/m³) above 0.
+---@field density number Density of the part. Expects a number (kg/m³) above 0.
 ---@field joint softvt.Slider|softvt.Hinge Joint that carries it; axes and origins are in the frame of the whole object.
 ---@field parent? string Name of the part that carries it; the fixed base by default.
 ---@field visuals? softvt.Visual[] Visuals by material id of its shape, from 0; those of the asset by default.
@@ -206,23 +206,23 @@
 ---A joint along which a part slides, such as that of a drawer. Values are in m.
 ---@class softvt.Slider
 ---@field axis number[] Direction in which its value grows. Expects a list of 3 numbers (object frame).
----@field lower number Lowest value. Expects metres.
+---@field lower number Lowest value of the joint. Expects metres.
 ---@field upper number Highest value, above the lowest. Expects metres.
----@field damping? number Viscous damping. Expects a number (N s/m) of 0 or more. Default 0.
----@field friction? number Dry friction. Expects a number (N) of 0 or more. Default 0.
+---@field damping? number Viscous damping of the joint. Expects a number (N s/m) of 0 or more. Default 0.
+---@field friction? number Dry friction of the joint. Expects a number (N) of 0 or more. Default 0.
 
 ---A joint about which a part turns, such as that of a door or a knob. Values are in rad.
 ---@class softvt.Hinge
 ---@field axis number[] Axis about which its value grows, right-handed. Expects a list of 3 numbers (object frame).
 ---@field origin number[] A point of the axis, with all joints at 0. Expects a list of 3 numbers (m, object frame).
----@field lower number Lowest value. Expects radians in -6.2832..6.2832.
+---@field lower number Lowest value of the joint. Expects radians in -6.2832..6.2832.
 ---@field upper number Highest value, above the lowest. Expects radians in -6.2832..6.2832.
----@field damping? number Viscous damping. Expects a number (N m s/rad) of 0 or more. Default 0.
----@field friction? number Dry friction. Expects a number (N m) of 0 or more. Default 0.
+---@field damping? number Viscous damping of the joint. Expects a number (N m s/rad) of 0 or more. Default 0.
+---@field friction? number Dry friction of the joint. Expects a number (N m) of 0 or more. Default 0.
 
 ---The appearance of a surface: a base material, and layers painted over it in order.
 ---@class softvt.Visual
----@field albedo number[] Base colour. Expects a list of 3 numbers in 0..1 (linear RGB).
+---@field albedo number[] Colour of the base. Expects a list of 3 numbers in 0..1 (linear RGB).
 ---@field roughness? number Roughness: 0 is a mirror, 1 is chalk. Expects a number in 0..1. Default 0.6.
 ---@field metalness? number Metalness: 1 is bare metal. Expects a number in 0..1. Default 0.
 ---@field layers? softvt.Layer[] Layers painted over the base, in this order.
@@ -230,7 +230,7 @@
 ---A colour laid over the layers below where a mask is not 0.
 ---@class softvt.Layer
 ---@field mask? softvt.Mask Weight of the layer; 1 everywhere by default.
----@field albedo number[] Colour. Expects a list of 3 numbers in 0..1 (linear RGB).
+---@field albedo number[] Colour of the layer. Expects a list of 3 numbers in 0..1 (linear RGB).
 ---@field roughness? number Roughness: 0 is a mirror, 1 is chalk. Expects a number in 0..1. Default 0.6.
 ---@field opacity? number Share of this layer where the mask is 1; with 0 only the relief shows. Expects a number in 0..1. Default 1.
 ---@field relief_m? number Height of the drawn surface where the mask is 1. It is drawn only: contact does not see it. Expects metres in -0.005..0.005. Default 0.
@@ -243,7 +243,7 @@
 
 ---Coulomb friction of a surface. A pair of surfaces has the larger of each coefficient, unless one is coated.
 ---@class softvt.Friction
----@field static_mu? number Static coefficient. Expects a number in 0..10. Default 0.6.
+---@field static_mu? number Static coefficient, 0 for none. Expects a number in 0..10. Default 0.6.
 ---@field dynamic_mu? number Dynamic coefficient, at most the static one. Expects a number in 0..10. Default 0.5.
 ---@field coated? boolean True for a layer on the surface (flour, oil, glaze), whose coefficients are those of any pair. Default false.
 
@@ -297,7 +297,7 @@
 ---@class softvt.GripperValues
 ---@field open? number Value that opens the gripper; not for code = "force". Expects a number.
 ---@field closed? number Value that closes it; not for code = "force". Expects a number.
----@field code? "continuous"|"binary"|"two-width"|"force" What the value commands. continuous: a closure in proportion between open and closed, the default. binary: closed beyond the middle, else open. two-width: open, or the width that the answers give just after closing, held until one opens. force: a grip force in N at which closing stops; below 0 opens.
+---@field code? "continuous"|"binary"|"two-width"|"force" Command of the value. continuous: a closure in proportion between open and closed, the default. binary: closed beyond the middle, else open. two-width: open, or the width that the answers give just after closing, held until one opens. force: a grip force in N at which closing stops; below 0 opens.
 ---@field latch? softvt.GripHysteresis For code = "binary": limits at which the gripper closes and opens, instead of the middle.
 
 ---Hysteresis of a binary gripper, in the unit of the gripper's number.
@@ -314,9 +314,9 @@
 
 ---A command for one control step (0.05 s): a pose of the tool centre point in the robot's base frame, or positions of the arm's joints, and a closure or a grip force. Give either joints, or position with axis_angle or quaternion; and either closure or force.
 ---@class softvt.Action
----@field position? number[] Position. Expects a list of 3 numbers (m, base frame).
+---@field position? number[] Position of the tool. Expects a list of 3 numbers (m, base frame).
 ---@field axis_angle? number[] Orientation as axis-angle. Expects a list of 3 numbers (rad, base frame).
----@field quaternion? number[] Orientation as quaternion. Expects a list of 4 numbers (w, x, y, z, base frame).
+---@field quaternion? number[] Orientation of the tool, as quaternion. Expects a list of 4 numbers (w, x, y, z, base frame).
 ---@field joints? number[] Positions of the arm's joints, from the base on. Expects a list of 7 numbers (rad).
 ---@field closure? number Gripper closure: 0 is open, 1 is closed. The grip code of the policy says what it commands. Expects a number in 0..1.
 ---@field force? number Grip force at which closing stops, at most robot.gripper.effort; below 0 opens. Expects a number (N).
@@ -331,7 +331,7 @@
 
 ---Builds a scene with the robot and lets it settle. Deformation refers to the settled shapes.
 ---@class softvt.SimulateSpec
----@field layout softvt.Layout Initial scene.
+---@field layout softvt.Layout Layout of the initial scene.
 ---@field suite? string Part of the seed. Default "experiment".
 ---@field episode? integer Part of the seed. Expects a whole number in 0..1000000000. Default 0.
 ---@field seed? integer Part of the seed; by default that of the run, --seed. Expects a whole number in 0..1000000000.
@@ -340,7 +340,7 @@
 ---Returns the results of a calibration: the safe window, the deformation limit τ, and the files to write.
 ---@class softvt.EnvelopeSpec
 ---@field asset string Name of the asset.
----@field protocol? "press"|"hand" How the sweep was made. Default "press".
+---@field protocol? "press"|"hand" Protocol of the sweep. Default "press".
 ---@field kappa? number Safety factor κ of the deformation limit τ = κ D_ref. Expects a number in 0..1. Default 0.5.
 ---@field stable_strain? number Stable strain of the material, at which 5 % of the volume ends the press. Expects a number in above 0..1.
 ---@field ended? string Why the sweep ended, if its last row does not tell.
@@ -360,22 +360,22 @@
 
 ---Returns instances of an asset as the episodes of a suite draw them, from a random stream that no episode uses. Without a variation each is the asset itself.
 ---@class softvt.Sample
----@field asset softvt.Asset The asset.
+---@field asset softvt.Asset Asset of the instances.
 ---@field variation? softvt.Variation Variation of the suite.
 ---@field suite string Name of the suite; part of the seed.
----@field count integer Number of instances. Expects a whole number in 1..10000.
+---@field count integer Number of instances to draw. Expects a whole number in 1..10000.
 
 ---Returns an image of one colour: `softvt.image { width = 640, height = 480, colour = { 255, 255, 255 } }`.
 ---@class softvt.NewImage
 ---@field width integer Width, pixels. Expects a whole number in 1..8192.
 ---@field height integer Height, pixels. Expects a whole number in 1..8192.
----@field colour number[] Colour. Expects a list of 3 numbers (sRGB of 0 to 255).
+---@field colour number[] Colour of every pixel. Expects a list of 3 numbers (sRGB of 0 to 255).
 
 ---Returns a plot as SVG, for the files of an experiment: `softvt.plot { title = "…", x = { label = "gap" }, y = { label = "D, %" }, series = { { label = "bun", points = { { 40, 0.1 }, { 38, 0.4 } } } } }`.
 ---@class softvt.Plot
----@field title string Title.
----@field x softvt.PlotAxis Horizontal axis.
----@field y softvt.PlotAxis Vertical axis.
+---@field title string Title above the plot.
+---@field x softvt.PlotAxis The horizontal axis, linear or logarithmic.
+---@field y softvt.PlotAxis The vertical axis, linear or logarithmic.
 ---@field series softvt.PlotSeries[] The series, at most six.
 ---@field levels? softvt.PlotLevel[] Horizontal lines, such as limits.
 
@@ -386,18 +386,18 @@
 
 ---Values of a plot that belong together.
 ---@class softvt.PlotSeries
----@field label? string Name beside the last point.
+---@field label? string Name at the last point.
 ---@field points number[][] Points { x, y }, in the order in which a line joins them.
 ---@field line? boolean False for points without a line. Default true.
 
 ---A horizontal line of a plot.
 ---@class softvt.PlotLevel
----@field y number Its value. Expects a number.
----@field label? string Text on it.
+---@field y number Value on the vertical axis. Expects a number.
+---@field label? string Text on the line.
 
 ---Returns a pose in the world frame: `softvt.pose { position = { 0.4, 0, 0.2 }, yaw = math.pi / 2 }`. Without a quaternion the hand points straight down.
 ---@class softvt.PoseSpec
----@field position number[] Position. Expects a list of 3 numbers (m, world).
+---@field position number[] Position of the pose. Expects a list of 3 numbers (m, world).
 ---@field yaw? number Rotation of the downward hand about the vertical, by default 0. Expects radians in -6.2832..6.2832.
 ---@field quaternion? number[] Orientation instead of yaw. Expects a list of 4 numbers (w, x, y, z).
 
@@ -412,8 +412,8 @@
 ---@field default any A number, string, boolean, or list of numbers or strings.
 ---@field integer? boolean True if only whole numbers are allowed. Default false.
 ---@field unit? string Unit of a number. Default "".
----@field min? number Lowest number. Expects a number.
----@field max? number Highest number. Expects a number.
+---@field min? number Lowest number that is accepted. Expects a number.
+---@field max? number Highest number that is accepted. Expects a number.
 ---@field choices? string[] The allowed strings; any by default.
 ---@field help? string Description for --help. Default "".
 ---@field only_with? table<string, any> Values of other options without which this one does nothing, and is refused: { sweep_protocol = "hand" }. A list must contain the value.
@@ -421,11 +421,11 @@
 
 ---A box centred on the origin.
 ---@class softvt.BoxSpec
----@field size number[] Edge lengths. Expects a list of 3 numbers (m).
+---@field size number[] Edge lengths along x, y and z. Expects a list of 3 numbers (m).
 
 ---A sphere centred on the origin.
 ---@class softvt.SphereSpec
----@field radius number Radius. Expects metres above 0.
+---@field radius number Radius of the sphere. Expects metres above 0.
 
 ---An ellipsoid centred on the origin.
 ---@class softvt.EllipsoidSpec
@@ -433,13 +433,13 @@
 
 ---A capsule along the z axis, centred on the origin.
 ---@class softvt.CapsuleSpec
----@field radius number Radius. Expects metres above 0.
+---@field radius number Radius of the tube and its caps. Expects metres above 0.
 ---@field length number Total length including the caps; at least twice the radius. Expects metres above 0.
 
 ---A cylinder along the z axis, centred on the origin.
 ---@class softvt.CylinderSpec
----@field radius number Radius. Expects metres above 0.
----@field height number Height. Expects metres above 0.
+---@field radius number Radius of the cylinder. Expects metres above 0.
+---@field height number Height of the cylinder. Expects metres above 0.
 
 ---A torus about the z axis, centred on the origin.
 ---@class softvt.TorusSpec
@@ -454,7 +454,7 @@
 ---A polygon in (x, z), extruded along y and centred on y = 0.
 ---@class softvt.PrismSpec
 ---@field corners number[][] Corners (x, z) in order.
----@field length number Length along y. Expects metres above 0.
+---@field length number Length of the prism along y. Expects metres above 0.
 
 ---A profile revolved about the z axis.
 ---@class softvt.LatheSpec
@@ -472,7 +472,7 @@
 
 ---Rises smoothly from 0 to 1 along an axis.
 ---@class softvt.GradientMask
----@field axis? "x"|"y"|"z"|number[] Direction. Expects one of "x", "y", "z" or a list of 3 numbers (any length). Default "z".
+---@field axis? "x"|"y"|"z"|number[] Direction of the gradient. Expects one of "x", "y", "z" or a list of 3 numbers (any length). Default "z".
 ---@field from_m number Coordinate at which it is 0. Expects metres.
 ---@field to_m number Coordinate at which it is 1; may be below from_m. Expects metres.
 
@@ -482,20 +482,20 @@
 ---@field octaves? integer Octaves, each half the size and half the weight of the one before. Expects a whole number in 1..8. Default 3.
 ---@field from? number Value of the noise that becomes 0. Expects a number in -1..2. Default 0.35.
 ---@field to? number Value of the noise that becomes 1; may be below from. Expects a number in -1..2. Default 0.65.
----@field seed? integer Selects the pattern. Expects a whole number in 0..4294967295. Default 0.
+---@field seed? integer Seed of the pattern. Expects a whole number in 0..4294967295. Default 0.
 
 ---Annual rings of a trunk: cylinders about a line along z, distorted by noise.
 ---@class softvt.RingsMask
 ---@field centre_m number[] A point of the line. Expects a list of 3 numbers (m).
 ---@field pitch_m number Distance from one ring to the next. Expects metres of 0.000001 or more.
 ---@field wobble_m? number Amplitude of the distortion. Expects metres of 0.000001 or more. Default 0.01.
----@field seed? integer Selects the pattern. Expects a whole number in 0..4294967295. Default 0.
+---@field seed? integer Seed of the pattern. Expects a whole number in 0..4294967295. Default 0.
 
 ---Boards along x, side by side in y, with one value per board.
 ---@class softvt.BoardsMask
 ---@field length_m number Length of a board. Expects metres of 0.000001 or more.
 ---@field width_m number Width of a board. Expects metres of 0.000001 or more.
----@field seed? integer Selects the pattern. Expects a whole number in 0..4294967295. Default 0.
+---@field seed? integer Seed of the pattern. Expects a whole number in 0..4294967295. Default 0.
 
 ---The gaps between boards of these sizes.
 ---@class softvt.SeamsMask
@@ -503,11 +503,11 @@
 ---@field width_m number Width of a board. Expects metres of 0.000001 or more.
 ---@field gap_m number Width of a gap. Expects metres of 0.000001 or more.
 
----Scattered round specks.
+---Round specks, scattered in space.
 ---@class softvt.SpecksMask
----@field spacing_m number Mean distance. Expects metres of 0.000001 or more.
+---@field spacing_m number Mean distance of the specks. Expects metres of 0.000001 or more.
 ---@field radius_m number Radius, at most half the spacing. Expects metres of 0.000001 or more.
----@field seed? integer Selects the pattern. Expects a whole number in 0..4294967295. Default 0.
+---@field seed? integer Seed of the pattern. Expects a whole number in 0..4294967295. Default 0.
 
 ---A plain weave in x and y: high in the middle of a thread.
 ---@class softvt.WeaveMask
@@ -515,13 +515,13 @@
 
 ---Surfaces that face a direction, by the cosine between their normal and that direction.
 ---@class softvt.FacingMask
----@field axis? "x"|"y"|"z"|number[] Direction. Expects one of "x", "y", "z" or a list of 3 numbers (any length). Default "z".
+---@field axis? "x"|"y"|"z"|number[] Direction that is compared with the normals. Expects one of "x", "y", "z" or a list of 3 numbers (any length). Default "z".
 ---@field from? number Cosine at which it is 0. Expects a number in -1..1. Default 0.
 ---@field to? number Cosine at which it is 1; may be below from. Expects a number in -1..1. Default 1.
 
 ---The inside of a shape: a painted rim, the grooves between ridges.
 ---@class softvt.InsideMask
----@field shape softvt.Shape The shape.
+---@field shape softvt.Shape Shape whose inside is 1.
 ---@field soft_m? number Width of the border, half of it on either side of the shape's surface. Expects metres of 0 or more. Default 0.
 
 ---The letters of a line of text, printed on surfaces that face the reader. Surfaces with text are drawn in finer detail.
@@ -533,16 +533,16 @@
 ---@field angle? number Rotation of the line on its surface, counter-clockwise for the reader. Expects radians in -6.2832..6.2832. Default 0.
 ---@field wrap_m? number Radius of the upright cylinder about the z axis that the line is wrapped around; flat by default. Expects metres of 0.000001 or more.
 ---@field weight? number Thickening of the strokes, in heights of a capital letter. Expects a number in 0..0.25. Default 0.08.
----@field font? "sans"|"mono" Typeface. Default "sans".
+---@field font? "sans"|"mono" Typeface of the letters. Default "sans".
 
 ---Rotates the shape about an axis through the origin.
 ---@class softvt.RotateSpec
----@field axis "x"|"y"|"z" The axis.
+---@field axis "x"|"y"|"z" Axis of the rotation.
 ---@field angle number Right-handed angle. Expects radians in -6.2832..6.2832.
 
 ---Twists the shape about an axis through the origin.
 ---@class softvt.TwistSpec
----@field axis "x"|"y"|"z" The axis.
+---@field axis "x"|"y"|"z" Axis of the twist.
 ---@field rate number Angle per length along the axis. Expects a number (rad/m).
 
 ---Bends the shape into an arc; the origin stays in place.
@@ -558,13 +558,13 @@
 ---@field count? integer Number of ridges around the axis. Expects a whole number in -1000..1000. Default 0.
 ---@field pitch? number Distance of ridges along the axis; infinite for flutes. Expects metres above 0. Default inf.
 ---@field radial_pitch? number Distance of ridges away from the axis; infinite if they do not depend on it. Expects metres above 0. Default inf.
----@field phase? number Phase. Expects radians. Default 0.
+---@field phase? number Phase of the ridges at the origin. Expects radians. Default 0.
 ---@field sharpness? number 1 is a sine; larger values give narrower ridges. Expects a number in 1..8. Default 1.
 ---@field mask? softvt.Ramp Weight of their height; 1 everywhere by default.
 
 ---A weight that rises smoothly from 0 to 1 along an axis.
 ---@class softvt.Ramp
----@field axis "x"|"y"|"z" The axis.
+---@field axis "x"|"y"|"z" Axis of the coordinate.
 ---@field from number Coordinate at which the weight is 0. Expects metres.
 ---@field to number Coordinate at which the weight is 1. Expects metres.
 
@@ -573,7 +573,7 @@
 ---@field height number Height; negative for pits. Expects metres.
 ---@field radius number Radius of a bump, at most half the spacing. Expects metres above 0.
 ---@field spacing number Mean distance of bumps. Expects metres above 0.
----@field seed? integer Selects their positions. Expects a whole number of 0 or more. Default 0.
+---@field seed? integer Seed of the positions of the bumps. Expects a whole number of 0 or more. Default 0.
 ---@field mask? softvt.Ramp Weight of their height; 1 everywhere by default.
 
 ---Gives all or part of the surface another material.
@@ -583,26 +583,32 @@
 
 ---Adds a soft body. A body that overlaps another or a solid by more than 1 mm is an error.
 ---@class softvt.WorldSoft
----@field name? string Name in messages. Default "body".
----@field shape softvt.Shape Shape.
----@field body softvt.Soft Material.
+---@field name? string Name of the body in messages. Default "body".
+---@field shape softvt.Shape Shape of the body at rest.
+---@field body softvt.Soft Material of the body.
 ---@field friction? softvt.Friction Friction of its surface.
 ---@field position number[] Position of its frame. Expects a list of 3 numbers (m).
 ---@field axis_angle? number[] Orientation; none by default. Expects a list of 3 numbers (rad).
 
 ---A solid that moves as prescribed (kinematic) or never (static).
 ---@class softvt.WorldSolid
----@field name? string Name in messages. Default "solid".
----@field shape softvt.Shape Shape.
+---@field name? string Name of the solid in messages. Default "solid".
+---@field shape softvt.Shape Shape of the solid.
 ---@field friction? softvt.Friction Friction of its surface.
 ---@field position number[] Position of its frame. Expects a list of 3 numbers (m).
 ---@field axis_angle? number[] Orientation; none by default. Expects a list of 3 numbers (rad).
 
 ---A gel pad of the robot on a rigid carrier that solid:move_to moves.
 ---@class softvt.WorldGelPad
----@field name? string Name in messages. Default "gel pad".
+---@field name? string Name of the pad in messages. Default "gel pad".
 ---@field position number[] Position of its apex. Expects a list of 3 numbers (m).
 ---@field axis_angle? number[] Orientation. Without one, the gel faces +x and its long side is vertical. Expects a list of 3 numbers (rad).
+
+---Holds a part of a soft body on a solid or in the world, where it is now. What moves the solid moves the part. Where it is held, the body does not touch the solid.
+---@class softvt.WorldAttach
+---@field body softvt.Body The soft body.
+---@field region softvt.Shape The part, in the frame of the shape of the body. It may be larger than the body.
+---@field to softvt.Solid|"world" The solid that holds the part, or "world".
 
 ---Renders the image of a camera, by default third_person.
 ---@class softvt.Render
@@ -614,7 +620,7 @@
 ---@class softvt.Text
 ---@field at number[] Left end of its baseline, from the top left. Expects a list of 2 numbers in -100000..100000 (pixels).
 ---@field size? number Height of the letters. Expects a number (pixels) in 4..200. Default 18.
----@field colour number[] Colour. Expects a list of 3 numbers (sRGB of 0 to 255).
+---@field colour number[] Colour of the letters. Expects a list of 3 numbers (sRGB of 0 to 255).
 
 ---Placement of an asset. Give either at or position.
 ---@class softvt.Place
@@ -631,13 +637,13 @@
 ---@class softvt.NewCamera
 ---@field name string Name, unique; also that of its image stream.
 ---@field mount? "world"|"hand" Frame that the camera is fixed to; hand is panda_hand. Default "world".
----@field position number[] Position. Expects a list of 3 numbers in -100..100 (m, frame of the mount).
+---@field position number[] Position of its centre. Expects a list of 3 numbers in -100..100 (m, frame of the mount).
 ---@field look_at? number[] A point in the middle of the image. Expects a list of 3 numbers in -100..100 (m, frame of the mount).
 ---@field up? number[] Upward direction in the image (with look_at); z by default. Expects a list of 3 numbers (frame of the mount).
 ---@field quaternion? number[] Orientation: the camera looks along its −z axis, and +y is up in the image. Expects a list of 4 numbers (w, x, y, z, frame of the mount).
 ---@field fovy? number Vertical field of view. Expects radians in 0.01..2.8. Default 0.8.
----@field near? number Nearest visible distance. Expects metres in 0.0001..100. Default 0.01.
----@field far? number Farthest visible distance. Expects metres in 0.001..10000. Default 20.
+---@field near? number Distance of the nearest visible point. Expects metres in 0.0001..100. Default 0.01.
+---@field far? number Distance of the farthest visible point. Expects metres in 0.001..10000. Default 20.
 ---@field width? integer Width of the image, pixels. Expects a whole number in 1..4096. Default 224.
 ---@field height? integer Height of the image, pixels. Expects a whole number in 1..4096. Default 224.
 
@@ -648,8 +654,8 @@
 
 ---Options of a motion of the arm.
 ---@class softvt.MotionOptions
----@field speed? number Largest speed. Expects a number (m/s) in above 0..6.8. Default 0.25.
----@field angular_speed? number Largest angular speed. Expects a number (rad/s) in above 0..10. Default 1.5.
+---@field speed? number Largest speed of the tool. Expects a number (m/s) in above 0..6.8. Default 0.25.
+---@field angular_speed? number Largest angular speed of the tool. Expects a number (rad/s) in above 0..10. Default 1.5.
 ---@field closure? number Closure at the end; by default it stays. Expects a number in 0..1.
 
 ---Options of closing and opening.
@@ -831,7 +837,7 @@ function Shape:round(radius) end
 function Shape:shell(wall) end
 
 ---@nodiscard
----Joins two shapes.
+---Joins the shape and another one.
 ---@param other softvt.Shape
 ---@return softvt.Shape
 function Shape:union(other) end
@@ -944,6 +950,11 @@ function World:static(spec) end
 ---@param spec softvt.WorldGelPad
 ---@return softvt.Solid
 function World:gel_pad(spec) end
+
+---Holds a part of a soft body on a solid or in the world, where it is now. What moves the solid moves the part. Where it is held, the body does not touch the solid.
+---@param spec softvt.WorldAttach
+---@return softvt.Attachment
+function World:attach(spec) end
 
 ---Makes one time step. Returns false and the reason if the state is invalid then; a further step is an error.
 ---@return boolean
@@ -1061,6 +1072,18 @@ local Solid = {}
 ---@param axis_angle? number[]
 function Solid:move_to(position, axis_angle) end
 
+---A part of a soft body that a solid or the world holds.
+---@class softvt.Attachment
+local Attachment = {}
+
+---Returns the force that holds the body, N, in the world frame.
+---@return number[]
+function Attachment:force() end
+
+---Returns the number of nodes that are held.
+---@return integer
+function Attachment:nodes() end
+
 ---Deformation of a body against its reference shape, in percent of the diagonal of its bounding box along its own axes.
 ---@class softvt.Deformation
 ---@field rms_pct number D: root mean square of the displacement over the volume.
@@ -1161,8 +1184,8 @@ local SafeWindow = {}
 
 ---Results of a calibration.
 ---@class softvt.Envelope
----@field protocol string How the sweep was made: "press" or "hand".
----@field window softvt.SafeWindow The safe window.
+---@field protocol string Protocol of the sweep: "press" or "hand".
+---@field window softvt.SafeWindow Loose and tight end of the safe window.
 ---@field width_contact_mm number? Widest width at which both pads touched, mm.
 ---@field width_at_d_ref_mm number? Width at D_ref, mm.
 ---@field tau number? Deformation limit τ, %.
@@ -1333,11 +1356,11 @@ function Rng:shuffle(list) end
 ---@class softvt.Scene
 ---@field objects softvt.Object[] The placed objects, in order.
 ---@field goal_object softvt.Object? The object of the task's goal, in shifts; nil in layouts, which several tasks may share.
----@field light softvt.Light The light.
+---@field light softvt.Light Key light and sky.
 ---@field base number[] Position of the robot base. Expects a list of 3 numbers in -1000..1000 (m, world).
 ---@field start_q number[] Joint angles of the arm at the start, within its limits. Expects a list of 7 numbers (rad).
 ---@field prompt string The instruction of the task, in shifts; nil in layouts.
----@field gravity number[] Gravity. Expects a list of 3 numbers in -100..100 (m/s², world).
+---@field gravity number[] Acceleration of gravity. Expects a list of 3 numbers in -100..100 (m/s², world).
 ---@field workspace_min number[] Lowest corner of the workspace. Expects a list of 3 numbers (m, world).
 ---@field workspace_max number[] Highest corner of the workspace. Expects a list of 3 numbers (m, world).
 local Scene = {}
@@ -1382,13 +1405,13 @@ local Light = {}
 
 ---A pinhole camera of a scene.
 ---@class softvt.Camera
----@field name string Name.
+---@field name string Name in the scene.
 ---@field mount "world"|"hand" Frame that the camera is fixed to.
----@field position number[] Position. Expects a list of 3 numbers in -100..100 (m, frame of the mount).
+---@field position number[] Position of its centre. Expects a list of 3 numbers in -100..100 (m, frame of the mount).
 ---@field quaternion number[] Orientation: the camera looks along its −z axis, and +y is up in the image. Expects a list of 4 numbers (w, x, y, z, frame of the mount).
 ---@field fovy number Vertical field of view. Expects radians in 0.01..2.8.
----@field near number Nearest visible distance. Expects metres in 0.0001..100.
----@field far number Farthest visible distance. Expects metres in 0.001..10000.
+---@field near number Distance of the nearest visible point. Expects metres in 0.0001..100.
+---@field far number Distance of the farthest visible point. Expects metres in 0.001..10000.
 ---@field width integer Width of the image, pixels. Expects a whole number in 1..4096.
 ---@field height integer Height of the image, pixels. Expects a whole number in 1..4096.
 local Camera = {}
@@ -1400,7 +1423,7 @@ function Camera:look_at(point, up) end
 
 ---The base material of a visual of a placed object. Its layers stay as they are.
 ---@class softvt.Material
----@field albedo number[] Base colour. Expects a list of 3 numbers in 0..1 (linear RGB).
+---@field albedo number[] Colour of the base. Expects a list of 3 numbers in 0..1 (linear RGB).
 ---@field roughness number Roughness: 0 is a mirror, 1 is chalk. Expects a number in 0..1.
 ---@field metalness number Metalness: 1 is bare metal. Expects a number in 0..1.
 local Material = {}
@@ -1496,7 +1519,7 @@ function Instances:sample(object, count) end
 ---The robot arm as an expert controls it. Each motion takes as many control steps as it needs.
 ---@class softvt.Arm
 ---@field pose softvt.Pose Measured pose of the tool centre point.
----@field target softvt.Pose Last commanded pose.
+---@field target softvt.Pose Pose of the last command.
 ---@field closure number Last commanded closure: 0 is open, 1 is closed.
 ---@field gripping boolean True from a call of grasp to the next call of release or open.
 ---@field feels boolean True under --policy tactile-servo, whose grasp closes by touch.
@@ -1539,7 +1562,7 @@ function Arm:grasp(closure, options) end
 ---@param options? softvt.ReleaseOptions
 function Arm:release(options) end
 
----Opens the gripper.
+---Opens the gripper to its full stroke.
 ---@param options? softvt.RateOptions
 function Arm:open(options) end
 
@@ -1574,7 +1597,7 @@ local List = {}
 ---@class softvt.EpisodeBrief
 ---@field suite string? Name of the suite; nil in a judged run.
 ---@field task integer? Index of the task, from 0; nil in a judged run.
----@field prompt string The instruction.
+---@field prompt string Instruction of the task.
 ---@field episode integer? Index of the episode, from 0; nil in a judged run.
 ---@field id string? Name of the episode in a judged run (--seed-file), from which its draws cannot be computed.
 local EpisodeBrief = {}
@@ -1583,7 +1606,7 @@ local EpisodeBrief = {}
 ---@class softvt.Observation
 ---@field time number Time since the policy took over, s.
 ---@field width number Measured distance of the gels, 0 to 0.08 m, with the steps and the offset of a real hand; exact with observes.drives.
----@field prompt string The instruction.
+---@field prompt string Instruction of the task.
 ---@field tactile softvt.Fingers Tactile sensors; requires observes.tactile.
 ---@field tactile_history softvt.Fingers[] Tactile sensors in the last 1 to 8 control steps, oldest first; requires observes.tactile.
 ---@field force softvt.Forces True forces on the gels; requires observes.force.
@@ -1603,8 +1626,8 @@ function Observation:camera(name) end
 
 ---The tactile sensors of both fingers at one control step.
 ---@class softvt.Fingers
----@field left softvt.TactileFrame The left finger.
----@field right softvt.TactileFrame The right finger.
+---@field left softvt.TactileFrame Frame of the left finger.
+---@field right softvt.TactileFrame Frame of the right finger.
 local Fingers = {}
 
 ---The tactile sensor of a finger at one control step; docs/tactile.md draws its frames.
@@ -1617,8 +1640,8 @@ local TactileFrame = {}
 ---The 99 markers of a finger, row by row, in px of its image: x to the right (towards the hand), y down. 1 px is 0.063 mm.
 ---@class softvt.Markers
 ---@field initial number[][] Positions on the untouched gel.
----@field present number[][] Present positions.
----@field motion number[][] Displacements.
+---@field present number[][] Present positions of the markers.
+---@field motion number[][] Displacements of the markers from rest.
 local Markers = {}
 
 ---Returns the mean displacement along x and y, which grows with shear along the gel's surface.
@@ -1687,7 +1710,7 @@ function softvt.task(spec) end
 ---@return softvt.Shift
 function softvt.shift(spec) end
 
----A number of each episode, beside the verdict: of the true state, which policies do not see.
+---A number of each episode in addition to its verdict, from the true state, which policies do not see.
 ---@param spec softvt.Metric
 ---@return softvt.Metric
 function softvt.metric(spec) end
@@ -2063,7 +2086,7 @@ function softvt.mask.boards(spec) end
 function softvt.mask.seams(spec) end
 
 ---@nodiscard
----Scattered round specks.
+---Round specks, scattered in space.
 ---@param spec softvt.SpecksMask
 ---@return softvt.Mask
 function softvt.mask.specks(spec) end

@@ -12,8 +12,8 @@
 //! in [`robot`], a rendered image in [`sensing::camera`], a tactile image in [`sensing::tactile`], the verdict on
 //! an episode in [`evaluation::judge`], a run of a suite in [`runner`]. `docs/library.md` has them together.
 //!
-//! The features `cli` and `runner` are on by default. Without `runner`, the crate has no Lua, datasets, reports or
-//! server, and [`rollout`] is the topmost layer.
+//! All features are on by default; `docs/library.md` has a table of them. Without any, [`rollout`] is the topmost
+//! layer.
 //!
 //! Units are SI throughout; a name carries its unit where it is not SI or not obvious. Frames are suffixes:
 //! `_w` world, `_b` robot base, `_h` hand, `_p` pad, `_o` object.
@@ -27,21 +27,21 @@ pub use softvt_benchmark as benchmark;
 pub use softvt_cli as cli;
 #[doc(inline)]
 pub use softvt_common::{cancel, disk_cache, episode_id, files, npy, parallel, range, settings, text};
-#[cfg(feature = "runner")]
+#[cfg(feature = "record")]
 #[doc(inline)]
 pub use softvt_dataset as dataset;
 #[doc(inline)]
 pub use softvt_evaluation as evaluation;
 #[doc(inline)]
 pub use softvt_geometry as geometry;
-#[cfg(feature = "runner")]
+#[cfg(feature = "video")]
 #[doc(inline)]
 pub use softvt_media as media;
 #[doc(inline)]
 pub use softvt_physics as physics;
 #[doc(inline)]
 pub use softvt_policy as policy;
-#[cfg(feature = "runner")]
+#[cfg(feature = "video")]
 #[doc(inline)]
 pub use softvt_report as report;
 #[doc(inline)]
@@ -55,16 +55,19 @@ pub use softvt_runner as runner;
 pub use softvt_runs as runs;
 #[doc(inline)]
 pub use softvt_scene as scene;
-#[cfg(feature = "runner")]
+#[cfg(feature = "lua")]
 #[doc(inline)]
 pub use softvt_script as script;
 #[doc(inline)]
 pub use softvt_sensing as sensing;
-#[cfg(feature = "runner")]
+#[cfg(feature = "serve")]
 #[doc(inline)]
 pub use softvt_serve as serve;
 #[doc(inline)]
 pub use softvt_signal as signal;
+#[cfg(feature = "watch")]
+#[doc(inline)]
+pub use softvt_watch as watch;
 
 /// The examples of the page.
 #[cfg(all(doctest, feature = "runner"))]

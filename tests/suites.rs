@@ -171,9 +171,8 @@ struct StartRegion {
 }
 
 /// Checks that poses cover a region and do not leave it.
-fn check_region(name: &str, poses: &[Pose], region: &StartRegion) -> Result<(), String> {
-    let yaw = poses.iter().map(|p| p.rotation.euler_angles().2);
-    let (low, high) = range(yaw);
+fn check_region(name: &str, poses: &[Pose], region: &StartRegion) {
+    let (low, high) = range(poses.iter().map(|p| p.rotation.euler_angles().2));
     let ranges = [
         ("x", range(poses.iter().map(|p| p.translation.x - region.centre[0])), region.max_offset),
         ("y", range(poses.iter().map(|p| p.translation.y - region.centre[1])), region.max_offset),
@@ -181,11 +180,9 @@ fn check_region(name: &str, poses: &[Pose], region: &StartRegion) -> Result<(), 
     ];
     for (what, (low, high), most) in ranges {
         let inside = low >= -most - 1e-9 && high <= most + 1e-9;
-        if !inside || high - low < region.share * 2.0 * most {
-            return Err(format!("{name} {what}: {low:.4} to {high:.4} of ±{most:.4}"));
-        }
+        let covered = high - low >= region.share * 2.0 * most;
+        assert!(inside && covered, "{name} {what}: {low:.4} to {high:.4} of ±{most:.4}");
     }
-    Ok(())
 }
 
 fn poses(scenes: &[Scene], name: &str) -> Vec<Pose> {
@@ -193,11 +190,11 @@ fn poses(scenes: &[Scene], name: &str) -> Vec<Pose> {
 }
 
 /// Checks that the start configurations of the arm vary with σ = 0.02 rad per joint.
-fn check_arm_variation(scenes: &[Scene]) -> Result<(), String> {
+fn check_arm_variation(scenes: &[Scene]) {
     let off: Vec<f64> = scenes.iter().flat_map(|s| (0..7).map(|i| s.start_q[i] - START_Q[i])).collect();
     let sigma = (off.iter().map(|x| x * x).sum::<f64>() / off.len() as f64).sqrt();
     // 350 draws: the standard error of σ is 4 %.
-    if (sigma - 0.02).abs() < 0.0025 { Ok(()) } else { Err(format!("arm: σ {sigma} rad")) }
+    assert!((sigma - 0.02).abs() < 0.0025, "arm: σ {sigma} rad");
 }
 
 /// Checks that the poses over all tasks, each relative to the centre of its task's region, cover a common region.
@@ -206,10 +203,9 @@ fn check_common_region(name: &str, all: &[Vec<Pose>], places: &[[f64; 2]], regio
         let back = Vec3::new(-at[0], -at[1], 0.0);
         poses.iter().map(move |pose| Pose::from_parts((pose.translation.vector + back).into(), pose.rotation))
     });
-    check_region(name, &moved.collect::<Vec<_>>(), &region).unwrap_or_else(|e| panic!("{e}"));
+    check_region(name, &moved.collect::<Vec<_>>(), &region);
 }
 
-/// The same for Spatial-Soft is in `tests/assets.rs`.
 #[test]
 fn soft_targets_on_the_floor_start_within_20_mm_and_30_degrees() {
     let loaded = load("object_soft");
@@ -223,7 +219,7 @@ fn soft_targets_on_the_floor_start_within_20_mm_and_30_degrees() {
     }
     let region = |max_yaw| StartRegion { centre: [0.0; 2], max_offset: 0.020, max_yaw, share: 0.85 };
     check_common_region("targets", &all, &middles, region(30f64.to_radians()));
-    check_arm_variation(&arms).unwrap_or_else(|e| panic!("{e}"));
+    check_arm_variation(&arms);
 }
 
 /// Tasks of LIBERO's object suite with the target in the far start region.
@@ -231,6 +227,28 @@ const FAR: [usize; 5] = [0, 4, 6, 7, 8];
 
 /// Episodes per task in the standard fifty of a suite.
 const STANDARD: usize = 5;
+
+#[test]
+fn both_objects_of_a_pair_start_within_20_mm_and_30_degrees() {
+    let loaded = load("spatial_soft");
+    for task in [0, 2, 4, 6, 8] {
+        let scenes: Vec<Scene> =
+            (0..60).map(|episode| open(&loaded, task, episode, EpisodeSplit::Validation)).collect();
+        for side in ["left", "right"] {
+            let poses = poses(&scenes, side);
+            let middle = |axis: usize| {
+                let (low, high) = range(poses.iter().map(|p| p.translation.vector[axis]));
+                0.5 * (low + high)
+            };
+            let max_yaw = 30f64.to_radians();
+            // 60 uniform draws cover less than 0.9 of the range with a probability of about 1 %.
+            let region =
+                StartRegion { centre: [middle(0), middle(1)], max_offset: 0.020, max_yaw, share: 0.9 };
+            check_region(side, &poses, &region);
+        }
+        check_arm_variation(&scenes);
+    }
+}
 
 #[test]
 fn rigid_objects_start_in_the_regions_of_libero() {
@@ -257,18 +275,17 @@ fn rigid_objects_start_in_the_regions_of_libero() {
     let region = |centre, max_offset| StartRegion { centre, max_offset, max_yaw: 0.0, share: 0.85 };
     check_common_region("targets", &targets, &own_places, region([0.0; 2], 0.025));
     check_common_region("distractors", &groceries, &places, region([0.0; 2], 0.025));
-    check_region("basket", &baskets, &region([0.0, 0.26], 0.010)).unwrap_or_else(|e| panic!("{e}"));
-    check_arm_variation(&arms).unwrap_or_else(|e| panic!("{e}"));
+    check_region("basket", &baskets, &region([0.0, 0.26], 0.010));
+    check_arm_variation(&arms);
     let loaded = load("spatial_rigid");
     let scenes: Vec<Scene> = (0..10).flat_map(|k| standard(&loaded, k)).collect();
     for (name, at) in [("plate", [0.06, 0.20]), ("cookies", [0.07, 0.03]), ("ramekin", [-0.20, 0.20])] {
-        check_region(name, &poses(&scenes, name), &region(at, 0.010)).unwrap_or_else(|e| panic!("{e}"));
+        check_region(name, &poses(&scenes, name), &region(at, 0.010));
     }
     let cabinet = StartRegion { max_yaw: 0.03, ..region([0.03, -0.27], 0.010) };
-    check_region("cabinet", &poses(&scenes, "cabinet"), &cabinet).unwrap_or_else(|e| panic!("{e}"));
-    check_region("stove", &poses(&scenes, "stove"), &region([-0.41, -0.14], 0.010))
-        .unwrap_or_else(|e| panic!("{e}"));
-    check_arm_variation(&scenes).unwrap_or_else(|e| panic!("{e}"));
+    check_region("cabinet", &poses(&scenes, "cabinet"), &cabinet);
+    check_region("stove", &poses(&scenes, "stove"), &region([-0.41, -0.14], 0.010));
+    check_arm_variation(&scenes);
 }
 
 #[test]

@@ -7,7 +7,7 @@ use softvt::{
     script::{self, EpisodeSetup, ExpertController, ExpertGrip, LoadedScript, SceneChanges},
 };
 
-/// The suite.
+/// Suite of the episodes.
 pub const SUITE: &str = "suites/spatial_soft.lua";
 
 /// The suite, read.

@@ -9,13 +9,12 @@ use softvt::{
         chart::{Chart, ChartPoint, Curve, Layout, Margins, Mark, SINGLE_CURVE},
         drawing::Symbol,
     },
-    script::envelope_plot,
 };
 
 /// The image, from the root of the repository.
 pub const IMAGE: &str = "docs/images/calibration.svg";
 /// Folder of the calibrations.
-const FOLDER: &str = "assets/calibration";
+pub const FOLDER: &str = "assets/calibration";
 /// Ends of the axes: closing, mm, and D over τ, of which the second is D_ref for κ = 0.5.
 const CLOSING_MM: f64 = 6.0;
 const D_OVER_TAU: f64 = 3.0;
@@ -29,10 +28,10 @@ const PANELS: Layout = Layout {
 };
 
 /// An asset with its calibration.
-struct Calibrated {
-    name: String,
-    envelope: Envelope,
-    limit: DeformationLimit,
+pub struct Calibrated {
+    pub name: String,
+    pub envelope: Envelope,
+    pub limit: DeformationLimit,
 }
 
 impl Calibrated {
@@ -85,9 +84,6 @@ fn within_the_axes(points: &[ChartPoint]) -> Vec<ChartPoint> {
 }
 
 /// The image, with the assets in the order of the closing that they bear.
-///
-/// # Errors
-/// A calibration that cannot be read.
 pub fn svg(root: &Path) -> Result<String, String> {
     let mut all = calibrations(root)?;
     all.sort_by(|a, b| a.tight_mm().total_cmp(&b.tight_mm()).then_with(|| a.name.cmp(&b.name)));
@@ -95,19 +91,8 @@ pub fn svg(root: &Path) -> Result<String, String> {
     Ok(PANELS.svg(label, &all.iter().map(Calibrated::panel).collect::<Vec<_>>()))
 }
 
-/// The plots of single assets, by their paths from the root of the repository.
-///
-/// # Errors
-/// A calibration that cannot be read.
-#[allow(dead_code, reason = "a test draws the image alone")]
-pub fn plots(root: &Path) -> Result<Vec<(String, String)>, String> {
-    let plot = |of: &Calibrated| {
-        (format!("{FOLDER}/{}.svg", of.name), envelope_plot(&of.name, &of.envelope, Some(of.limit)))
-    };
-    Ok(calibrations(root)?.iter().map(plot).collect())
-}
-
-fn calibrations(root: &Path) -> Result<Vec<Calibrated>, String> {
+/// All calibrations, in no order.
+pub fn calibrations(root: &Path) -> Result<Vec<Calibrated>, String> {
     let folder = root.join(FOLDER);
     let entries = fs::read_dir(&folder).map_err(|error| format!("{}: {error}", folder.display()))?;
     let mut all = Vec::new();

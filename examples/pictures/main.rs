@@ -1,6 +1,7 @@
 //! Draws the pictures of `docs/images/` and `assets/calibration/` that follow from committed results:
 //! `cargo run --release --example pictures`
 
+mod asset_plots;
 mod calibration;
 mod results;
 mod validation;
@@ -10,7 +11,7 @@ use std::{fs, path::Path};
 fn main() -> Result<(), String> {
     let root = Path::new(".");
     write(calibration::IMAGE, &calibration::svg(root)?)?;
-    calibration::plots(root)?.iter().try_for_each(|(path, plot)| write(path, plot))?;
+    asset_plots::plots(root)?.iter().try_for_each(|(path, plot)| write(path, plot))?;
     write(results::IMAGE, &results::svg(root)?)?;
     write(validation::IMAGE, &validation::svg(root)?)
 }

@@ -24,10 +24,6 @@ const TOP: f32 = 40.0;
 const BOTTOM: f32 = 52.0;
 const FONT_SIZE: f32 = 13.0;
 
-/// The image.
-///
-/// # Errors
-/// Results that cannot be read.
 pub fn svg(root: &Path) -> Result<String, String> {
     let (mut shown, labels) = (rows::read(root)?, rows::labels(root)?);
     shown.retain(|row| row.script == SCRIPT);

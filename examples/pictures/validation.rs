@@ -24,9 +24,6 @@ const FONT_SIZE: f32 = 12.0;
 const POWERS: [i32; 2] = [-9, 2];
 
 /// The image: dots in piles, rings for missed bounds.
-///
-/// # Errors
-/// The page cannot be read or has no claims.
 pub fn svg(root: &Path) -> Result<String, String> {
     let page = fs::read_to_string(root.join(PAGE)).map_err(|error| format!("{PAGE}: {error}"))?;
     let shares = shares(&page);

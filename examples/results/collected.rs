@@ -23,9 +23,6 @@ pub fn rates(root: &Path) -> Result<Value, String> {
 
 /// Adds the runs of a folder, made with the physics of this version. A row replaces the one of the same
 /// script, suite and controller.
-///
-/// # Errors
-/// If the folder has no finished run, or a file cannot be read or written.
 pub fn add(root: &Path, folder: &Path) -> Result<(), String> {
     let (runs, physics) = (runs(folder)?, physics(root)?);
     if runs.is_empty() {

@@ -20,7 +20,6 @@ pub struct Rate {
 
 /// Results of a controller in a suite. Medians are over the episodes in which they are defined.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[allow(missing_docs, reason = "named as in summary.json")]
 pub struct Row {
     pub script: String,
     pub suite: String,
@@ -34,14 +33,12 @@ pub struct Row {
     pub d_over_tau: Option<f64>,
     pub grip_ratio: Option<f64>,
     pub goal_time_s: Option<f64>,
-    /// Version of softvt.
     pub softvt: String,
     pub seed: u64,
     /// Final state of the golden episode in the version that made the run.
     pub physics: String,
 }
 
-/// Reads all rows.
 pub fn read(root: &Path) -> Result<Vec<Row>, String> {
     let text = fs::read_to_string(root.join(ROWS)).map_err(|error| format!("{ROWS}: {error}"))?;
     text.lines().map(|line| serde_json::from_str(line).map_err(|error| format!("{ROWS}: {error}"))).collect()

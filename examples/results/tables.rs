@@ -20,9 +20,6 @@ const BELOW_BOUND: [&str; 1] = ["expert-binary"];
 type Labels = BTreeMap<String, String>;
 
 /// The README with its table of verdicts and its rates updated.
-///
-/// # Errors
-/// If it does not have the lines around a part once each.
 pub fn written(readme: &str, rows: &[Row], labels: &Labels, rates: &Value) -> Result<String, String> {
     let readme = replaced(readme, "verdicts", &first_screen(rows, labels))?;
     replaced(&readme, "rates", &rates_sentence(rates))
@@ -49,9 +46,6 @@ fn rates_sentence(rates: &Value) -> String {
 }
 
 /// The README with a new part of a name.
-///
-/// # Errors
-/// If it does not have the lines around the part once each.
 fn replaced(readme: &str, name: &str, part: &str) -> Result<String, String> {
     let (begin, end) = (format!("<!-- {name}:begin -->\n"), format!("<!-- {name}:end -->"));
     let parts = readme.split_once(&begin).and_then(|(before, rest)| Some((before, rest.split_once(&end)?.1)));

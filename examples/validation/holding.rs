@@ -4,7 +4,7 @@ use softvt::geometry::Vec3;
 
 use crate::{
     drives, friction,
-    page::{Report, header, heading, percent, row, short, yes},
+    page::{Report, header, heading, percent, short, yes},
     time_step,
 };
 
@@ -13,39 +13,31 @@ pub fn friction(report: &mut Report) {
         "Friction",
         "A cube held at gap 48 mm with the weight at a share of the friction capacity: creep over 5 s.",
     );
-    header(&["weight / capacity", "creep mm"]);
+    header("weight / capacity | creep mm");
     for share in [0.16, 0.4, 0.6, 0.8, 0.9] {
         let creep = friction::creep(share);
-        row(&[format!("{:.4}", creep.share), short(creep.creep_mm)]);
+        row!("{:.4} | {}", creep.share, short(creep.creep_mm));
         report.claim(&format!("creep at {share} of capacity, mm"), [creep.creep_mm], 0.01);
     }
     println!(
         "\nBetween pads so large that the contact stays the same, capacity in closed form: acceleration between 0.2 and 0.3 s.\n"
     );
-    header(&["weight / capacity", "m/s²", "g (1 − capacity/load)", ""]);
+    header("weight / capacity | m/s² | g (1 − capacity/load) | ");
     for load in [1.05, 1.5] {
         let fall = friction::fall(load);
         let error = fall.acceleration / fall.expected - 1.0;
-        row(&[
-            load.to_string(),
-            format!("{:.4}", fall.acceleration),
-            format!("{:.4}", fall.expected),
-            percent(error),
-        ]);
+        row!("{load} | {:.4} | {:.4} | {}", fall.acceleration, fall.expected, percent(error));
         report.claim(&format!("fall at {load} of capacity"), [error], 0.05);
     }
     println!(
         "\nAt 60 % of capacity: the hand turns by 90° in 1 s and back, or shakes with 2 m/s² at 2 Hz.\n"
     );
-    header(&["motion", "axis", "weight / capacity", "shift in the hand mm", "pad slid"]);
+    header("motion | axis | weight / capacity | shift in the hand mm | pad slid");
     for (name, axis) in [("x", Vec3::x()), ("y", Vec3::y()), ("z", Vec3::z())] {
         let mut print = |motion: &str, c: friction::Carried| {
-            row(&[motion.to_owned(), name.to_owned(), short(c.share), short(c.shift_mm), yes(c.slid)]);
-            report.claim(
-                &format!("{motion} {name}: shift, mm"),
-                [if c.slid { f64::INFINITY } else { c.shift_mm }],
-                0.1,
-            );
+            row!("{motion} | {name} | {} | {} | {}", short(c.share), short(c.shift_mm), yes(c.slid));
+            let shift_mm = if c.slid { f64::INFINITY } else { c.shift_mm };
+            report.claim(&format!("{motion} {name}: shift, mm"), [shift_mm], 0.1);
         };
         if name != "z" {
             print("turn about", friction::turned(axis));
@@ -60,7 +52,7 @@ pub fn time_step(report: &mut Report) {
         "Equilibria at 60, 120 and 240 Hz do not depend on it. The step of implicit Euler damps motion as stiffness-proportional damping of \
          one step does: what moves is damped by β + dt, in the benchmark by 5 ms + 16.7 ms.",
     );
-    header(&["squeeze", "F grip", "F hold", "D hold %"]);
+    header("squeeze | F grip | F hold | D hold %");
     for (name, options, bound) in time_step::cases() {
         let runs = time_step::refined(&options);
         let columns = [
@@ -69,12 +61,9 @@ pub fn time_step(report: &mut Report) {
             runs.each_ref().map(|o| o.d_hold_pct),
         ];
         let cells = columns.map(|c| c.map(|v| format!("{v:.5}")).join(", "));
-        row(&[&[name.to_owned()], cells.as_slice()].concat());
-        report.claim(
-            &format!("{name}: 60 to 240 Hz"),
-            columns.iter().flat_map(|c| c.map(|v| v / c[2] - 1.0)),
-            bound,
-        );
+        row!("{name} | {}", cells.join(" | "));
+        let changes = columns.iter().flat_map(|c| c.map(|v| v / c[2] - 1.0));
+        report.claim(&format!("{name}: 60 to 240 Hz"), changes, bound);
     }
     moving(report);
     hand(report);
@@ -87,17 +76,14 @@ fn hand(report: &mut Report) {
     println!(
         "\nPeak acceleration of the hand along a lift by 0.1 m in 1.2 s, which is commanded at 20 Hz; that of the path is {path:.3} m/s².\n"
     );
-    header(&["physics steps per second", "m/s²", "over the path"]);
+    header("physics steps per second | m/s² | over the path");
     let found = drives::RATES.map(drives::hand_acceleration);
     for (rate, found) in drives::RATES.iter().zip(found) {
-        row(&[rate.to_string(), format!("{found:.3}"), format!("{:.2}", found / path)]);
+        row!("{rate} | {found:.3} | {:.2}", found / path);
     }
     report.claim("acceleration of the hand, 60 to 480 Hz", found.map(|a| a / found[3] - 1.0), 0.2);
-    report.claim(
-        "acceleration of the hand over that of the path, less 1",
-        found.map(|a| a / path - 1.0),
-        1.0,
-    );
+    let over_path = found.map(|a| a / path - 1.0);
+    report.claim("acceleration of the hand over that of the path, less 1", over_path, 1.0);
 }
 
 /// Prints the verdicts at several rates of physics steps.
@@ -105,21 +91,12 @@ fn verdicts() {
     println!(
         "\nVerdicts in the hidden suites (`.ci/time-steps` runs the episodes; *turned*: other than at the first rate).\n"
     );
-    header(&[
-        "suite",
-        "controller",
-        "steps per second",
-        "episodes",
-        "Goal %",
-        "Safety %",
-        "Goal turned",
-        "Safety turned",
-    ]);
+    header(
+        "suite | controller | steps per second | episodes | Goal % | Safety % | Goal turned | Safety turned",
+    );
     for one in drives::verdicts() {
-        let counts = [one.goal_turned, one.safety_turned].map(|count| count.to_string());
-        let rates = [one.goal, one.safety].map(|rate| format!("{rate:.1}"));
-        let names = [one.suite, one.controller, one.rate_hz.to_string(), one.episodes.to_string()];
-        row(&[names.as_slice(), &rates, &counts].concat());
+        let run = format!("{} | {} | {} | {}", one.suite, one.controller, one.rate_hz, one.episodes);
+        row!("{run} | {:.1} | {:.1} | {} | {}", one.goal, one.safety, one.goal_turned, one.safety_turned);
     }
 }
 
@@ -130,34 +107,24 @@ fn moving(report: &mut Report) {
          Speed of a soft ball of 50 mm (30 kPa) after 3 s on a slope, m/s, beside that of a rigid one.\n",
         time_step::RATES.map(|rate| rate.to_string()).join(", ")
     );
-    header(&["motion", "β = 5 ms", "β + dt = 21.7 ms", "rigid"]);
+    header("motion | β = 5 ms | β + dt = 21.7 ms | rigid");
     let same = |_: f64| time_step::BETA;
     // Zero without a sign.
     let shown = |value: f64| format!("{:.3}", (1e3 * value).round() / 1e3 + 0.0);
     let cells = |found: [f64; 3]| found.map(shown).join(", ");
     let [with_beta, with_sum] = [&same as &dyn Fn(f64) -> f64, &time_step::compensated]
         .map(|beta| time_step::RATES.map(|rate| time_step::lifted(rate, beta(rate))));
-    row(&["long body, lifted".to_owned(), cells(with_beta), cells(with_sum), String::new()]);
-    report.claim(
-        "long body, lifted, 60 to 240 Hz with the same β + dt",
-        with_sum.map(|peak| peak / with_sum[2] - 1.0),
-        0.05,
-    );
-    report.claim(
-        "long body, lifted, 60 to 240 Hz with the same β",
-        with_beta.map(|peak| peak / with_beta[2] - 1.0),
-        0.05,
-    );
+    row!("long body, lifted | {} | {} | ", cells(with_beta), cells(with_sum));
+    let changes = |peaks: [f64; 3]| peaks.map(|peak| peak / peaks[2] - 1.0);
+    report.claim("long body, lifted, 60 to 240 Hz with the same β + dt", changes(with_sum), 0.05);
+    report.claim("long body, lifted, 60 to 240 Hz with the same β", changes(with_beta), 0.05);
     for degrees in [1.0f64, 3.0] {
         let slope = degrees.to_radians();
         let [with_beta, with_sum] = [&same as &dyn Fn(f64) -> f64, &time_step::compensated]
             .map(|beta| time_step::RATES.map(|rate| time_step::rolled(rate, beta(rate), slope)));
         let rigid = time_step::rolled_rigid(slope);
-        row(&[format!("soft ball on {degrees}°"), cells(with_beta), cells(with_sum), format!("{rigid:.3}")]);
-        report.claim(
-            &format!("soft ball on {degrees}°: speed of a rigid one"),
-            [with_beta[0] / rigid - 1.0],
-            0.05,
-        );
+        row!("soft ball on {degrees}° | {} | {} | {rigid:.3}", cells(with_beta), cells(with_sum));
+        let what = format!("soft ball on {degrees}°: speed of a rigid one");
+        report.claim(&what, [with_beta[0] / rigid - 1.0], 0.05);
     }
 }

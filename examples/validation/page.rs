@@ -1,5 +1,12 @@
 //! Headings, tables and the summary of the page.
 
+/// Prints a row of a table, whose cells are separated by bars.
+macro_rules! row {
+    ($($cells:tt)*) => {
+        println!("| {} |", format_args!($($cells)*))
+    };
+}
+
 /// A result and its bound, if it has one.
 struct Claim {
     what: String,
@@ -34,15 +41,11 @@ impl Report {
             "The worst result of each claim against its bound. Relative errors are shares of 1. Columns of the tables above that are not \
              named here have no bound.",
         );
-        header(&["claim", "worst", "bound", ""]);
+        header("claim | worst | bound | ");
         for c in &self.claims {
             let verdict = c.bound.map_or("", |bound| if c.worst <= bound { "reached" } else { "**missed**" });
-            row(&[
-                c.what.clone(),
-                short(c.worst),
-                c.bound.map_or("none".to_owned(), short),
-                verdict.to_owned(),
-            ]);
+            let bound = c.bound.map_or("none".to_owned(), short);
+            row!("{} | {} | {bound} | {verdict}", c.what, short(c.worst));
         }
     }
 }
@@ -51,12 +54,9 @@ pub fn heading(title: &str, text: &str) {
     println!("\n## {title}\n\n{text}\n");
 }
 
-pub fn header(names: &[&str]) {
-    println!("| {} |\n|{}", names.join(" | "), "---|".repeat(names.len()));
-}
-
-pub fn row(cells: &[String]) {
-    println!("| {} |", cells.join(" | "));
+/// Begins a table; `names` are separated as in its rows.
+pub fn header(names: &str) {
+    println!("| {names} |\n|{}", "---|".repeat(names.split(" | ").count()));
 }
 
 /// Formats a value with three significant digits.
@@ -75,6 +75,6 @@ pub fn percent(share: f64) -> String {
     format!("{:+.2} %", 100.0 * share)
 }
 
-pub fn yes(value: bool) -> String {
-    if value { "yes" } else { "no" }.to_owned()
+pub fn yes(value: bool) -> &'static str {
+    if value { "yes" } else { "no" }
 }

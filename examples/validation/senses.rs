@@ -2,7 +2,7 @@
 
 use crate::{
     camera, gel,
-    page::{Report, header, heading, percent, row},
+    page::{Report, header, heading, percent},
 };
 
 pub fn gel_under_a_ball(report: &mut Report) {
@@ -12,7 +12,7 @@ pub fn gel_under_a_ball(report: &mut Report) {
          offsets from it, against an independent axisymmetric finite-element solution: depth for the force, and the largest \
          outward motion of the surface.",
     );
-    header(&["force N", "depth mm, reference", "found", "", "outward µm, reference", "found", ""]);
+    header("force N | depth mm, reference | found |  | outward µm, reference | found | ");
     let gel = gel::flat_gel();
     let (mut shallow, mut deep, mut outwards) = (Vec::new(), Vec::new(), Vec::new());
     for of in gel::PRESSES {
@@ -27,15 +27,11 @@ pub fn gel_under_a_ball(report: &mut Report) {
             deep.push(worst)
         }
         outwards.push(peak / of.outward - 1.0);
-        row(&[
-            of.force.to_string(),
-            format!("{}", 1e3 * of.depth),
-            format!("{:.4} to {:.4}", 1e3 * least, 1e3 * most),
-            percent(worst),
-            format!("{:.2}", 1e6 * of.outward),
-            format!("{:.2}", 1e6 * peak),
-            percent(peak / of.outward - 1.0),
-        ]);
+        let ([least_mm, most_mm], [outward_um, peak_um]) =
+            ([least, most].map(|d| 1e3 * d), [of.outward, peak].map(|x| 1e6 * x));
+        let depth = format!("{} | {least_mm:.4} to {most_mm:.4} | {}", 1e3 * of.depth, percent(worst));
+        let outward = percent(peak / of.outward - 1.0);
+        row!("{} | {depth} | {outward_um:.2} | {peak_um:.2} | {outward}", of.force);
     }
     report.claim("gel: depth for the force at 0.1 mm", shallow, gel::depth_bound(1e-4));
     report.claim("gel: depth for the force beyond", deep, gel::depth_bound(1e-3));

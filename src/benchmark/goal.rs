@@ -21,14 +21,11 @@ pub enum Goal {
     },
     /// A joint is open by a share of its range or less.
     Closed {
-        /// Part of an articulated object.
         joint: String,
         /// Largest share of the range, 0..=1.
         share: f64,
     },
-    /// The position of a joint is within a range.
     Turned {
-        /// Part of an articulated object.
         joint: String,
         /// Lowest and highest position, rad of a hinge and m of a slider.
         range: [f64; 2],
@@ -41,9 +38,8 @@ pub enum Goal {
         /// Largest horizontal distance of the centres, m.
         distance_m: f64,
     },
-    /// The object is beside the target, and the robot does not touch it.
+    /// The object is on a side of the target, and the robot does not touch it.
     Beside {
-        /// Side of the target.
         side: Side,
         /// The object, the target, and how long the relation must hold.
         #[serde(flatten)]
@@ -53,23 +49,17 @@ pub enum Goal {
     },
     /// The object is upright, and the robot does not touch it.
     Upright {
-        /// Scene name of the object.
         object: String,
-        /// Time for which it must stay upright, s.
         hold_s: f64,
         /// Largest angle between its z axis and the vertical, rad.
         angle_rad: f64,
     },
-    /// A function of the script returns true.
     Predicate {
         /// Description of the condition, as records and reports show it.
         name: String,
     },
-    /// All of these hold at once.
     All(SubGoals),
-    /// At least one of these holds.
     Any(SubGoals),
-    /// None of these holds.
     None(SubGoals),
     /// Each of these has held once after the one before it had; the last one holds.
     Sequence(SubGoals),
@@ -78,18 +68,14 @@ pub enum Goal {
 /// An object, what it is placed relative to, and for how long.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Placement {
-    /// Scene name of the object to be moved.
     pub object: String,
-    /// Scene name of the other object.
     pub target: String,
     /// Time for which the object must stay, s.
     pub hold_s: f64,
 }
 
-/// Goals that are combined.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SubGoals {
-    /// In order.
     pub goals: Vec<Goal>,
 }
 
@@ -108,7 +94,6 @@ pub enum Side {
 }
 
 impl Side {
-    /// Its words: "left of".
     pub fn words(self) -> &'static str {
         match self {
             Self::LeftOf => "left of",
@@ -140,25 +125,24 @@ impl Goal {
         }
     }
 
+    fn placement(&self) -> Option<&Placement> {
+        match self {
+            Self::On(of) | Self::Inside(of) | Self::Near { of, .. } | Self::Beside { of, .. } => Some(of),
+            _ => None,
+        }
+    }
+
     /// Scene name of the object that a predicate moves; `None` for a joint, a function and a combination.
     pub fn object(&self) -> Option<&str> {
         match self {
-            Self::On(of) | Self::Inside(of) | Self::Near { of, .. } | Self::Beside { of, .. } => {
-                Some(&of.object)
-            }
             Self::Upright { object, .. } => Some(object),
-            _ => None,
+            _ => self.placement().map(|of| of.object.as_str()),
         }
     }
 
     /// Scene name of what a predicate places its object relative to.
     pub fn target(&self) -> Option<&str> {
-        match self {
-            Self::On(of) | Self::Inside(of) | Self::Near { of, .. } | Self::Beside { of, .. } => {
-                Some(&of.target)
-            }
-            _ => None,
-        }
+        self.placement().map(|of| of.target.as_str())
     }
 
     /// Scene name of the part whose joint a predicate is about.
@@ -175,24 +159,23 @@ impl Goal {
     /// value of a joint. Values are rounded to a micrometre or microradian.
     pub fn with_joint_ranges(&self, limits: &impl Fn(&str) -> Option<[f64; 2]>) -> Self {
         let rounded = |value: f64| (1e6 * value).round() / 1e6;
-        let range = |joint: &String, shares: [f64; 2]| {
-            let [low, high] = limits(joint)?;
-            let range = shares.map(|share| rounded(low + share * (high - low)));
-            Some(Self::Turned { joint: joint.clone(), range })
-        };
-        let parts = |parts: &SubGoals| SubGoals {
-            goals: parts.goals.iter().map(|goal| goal.with_joint_ranges(limits)).collect(),
-        };
-        match self {
-            Self::Opened { joint, share } => range(joint, [*share, 1.0]).unwrap_or_else(|| self.clone()),
-            Self::Closed { joint, share } => range(joint, [0.0, *share]).unwrap_or_else(|| self.clone()),
-            Self::Turned { joint, range } => Self::Turned { joint: joint.clone(), range: range.map(rounded) },
-            Self::All(of) => Self::All(parts(of)),
-            Self::Any(of) => Self::Any(parts(of)),
-            Self::None(of) => Self::None(parts(of)),
-            Self::Sequence(of) => Self::Sequence(parts(of)),
-            other => other.clone(),
+        let mut goal = self.clone();
+        match &mut goal {
+            Self::Opened { joint, share } | Self::Closed { joint, share } => {
+                if let Some([low, high]) = limits(joint) {
+                    let shares =
+                        if matches!(self, Self::Opened { .. }) { [*share, 1.0] } else { [0.0, *share] };
+                    let range = shares.map(|share| rounded(low + share * (high - low)));
+                    return Self::Turned { joint: joint.clone(), range };
+                }
+            }
+            Self::Turned { range, .. } => *range = range.map(rounded),
+            Self::All(of) | Self::Any(of) | Self::None(of) | Self::Sequence(of) => {
+                of.goals.iter_mut().for_each(|part| *part = part.with_joint_ranges(limits));
+            }
+            _ => {}
         }
+        goal
     }
 
     /// Description of the goal: "bun in cabinet.top_drawer". A sequence within another combination is in parentheses,

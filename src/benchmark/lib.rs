@@ -1,5 +1,5 @@
 //! The benchmark as plain data, as scripts return it: suites, tasks, experiments and plans.
-#![warn(missing_docs, unreachable_pub)]
+#![warn(unreachable_pub)]
 
 pub mod goal;
 pub mod goal_conflict;
@@ -14,7 +14,6 @@ use serde::{Deserialize, Serialize};
 pub use self::goal::{Goal, Placement};
 pub use self::settings::{CONTROL_DT, CONTROL_HZ, steps_per_control};
 
-/// Kind of the objects of a suite.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum ObjectType {
@@ -24,11 +23,9 @@ pub enum ObjectType {
     Rigid,
 }
 
-/// Policy that demonstrates the tasks of a suite.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Teacher {
-    /// The scripted expert, which knows the object.
     #[default]
     Expert,
     /// The expert with a hand that feels how firmly it must hold.
@@ -36,7 +33,6 @@ pub enum Teacher {
 }
 
 impl Teacher {
-    /// True for the scripted expert.
     pub fn is_expert(&self) -> bool {
         *self == Self::Expert
     }
@@ -46,28 +42,24 @@ impl Teacher {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum TaskDifference {
-    /// Tasks differ in the object.
     Object,
     /// Tasks differ in the layout.
     Spatial,
 }
 
-/// What a controller has to know of an instance to grip it safely.
+/// Knowledge of an instance that a safe grip takes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum NeededKnowledge {
     /// Nothing but its kind: one closure per kind suffices.
     Nothing,
-    /// Its size, which shows.
     Size,
     /// Stiffness, mass or friction, which do not show: the grip has to be found by trial.
     Trial,
 }
 
-/// One task of a suite.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Task {
-    /// Index in the suite.
     pub id: usize,
     /// The instruction to the policy, and the name of the task in results.
     pub prompt: String,
@@ -89,7 +81,6 @@ pub struct Task {
 /// A named change of the scene, for runs under shifted conditions (`--shift`).
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Shift {
-    /// Name on the command line.
     pub name: String,
     /// Unit of its value, "1" for none.
     pub unit: String,
@@ -104,25 +95,20 @@ pub struct Shift {
 /// A set of tasks that are reported together.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Suite {
-    /// Name, as in results.
     pub name: String,
-    /// Kind of its objects.
     pub object_type: ObjectType,
     /// Factor that varies between its tasks.
     pub tasks_differ_in: TaskDifference,
-    /// What a safe grip needs, if the suite states it.
+    /// Knowledge that a safe grip takes, if the suite states it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub needs: Option<NeededKnowledge>,
-    /// Default number of episodes per task.
     pub episodes: u32,
-    /// The tasks, in order.
     pub tasks: Vec<Task>,
-    /// Shifts that the suite supports.
     pub shifts: Vec<Shift>,
     /// Ranges from which the soft objects, the light and the cameras of every episode are drawn, if they vary.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub vary: Option<variation::VariationRanges>,
-    /// Numbers of each episode that the suite measures beside the verdict.
+    /// Numbers of each episode that the suite measures in addition to the verdict.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub metrics: Vec<metric::Metric>,
     /// Settings of physics, robot, sensors and judge.
@@ -130,7 +116,6 @@ pub struct Suite {
     /// The suite of soft objects whose rigid twin this is; its initial states are those of that suite.
     #[serde(default)]
     pub twin_of: Option<String>,
-    /// Policy whose demonstrations are recorded.
     #[serde(default, skip_serializing_if = "Teacher::is_expert")]
     pub teacher: Teacher,
 }
@@ -139,7 +124,6 @@ pub struct Suite {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(from = "(String, f64)", into = "(String, f64)")]
 pub struct ShiftValue {
-    /// Name of the shift.
     pub name: String,
     /// Value, in the unit of the shift.
     pub value: f64,
@@ -163,7 +147,6 @@ pub const REFERENCE: &str = "reference";
 /// A named set of changes under which suites are run in addition to the reference.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Condition {
-    /// Name, as in results.
     pub name: String,
     /// Shifts, as `--shift` takes them.
     pub shift: Vec<ShiftValue>,
@@ -174,7 +157,6 @@ pub struct Condition {
     pub policy: Option<String>,
     /// Kind of suites to which the condition applies; `None` for all.
     pub only: Option<ObjectType>,
-    /// True for the rigid twin of the suites.
     #[serde(default)]
     pub rigid_twin: bool,
 }
@@ -183,27 +165,19 @@ pub struct Condition {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case", tag = "kind")]
 pub enum Plan {
-    /// Evaluate a policy on one suite.
     Suite(Box<Suite>),
-    /// Evaluate a policy on several suites.
     Suites {
-        /// In order.
         suites: Vec<Suite>,
     },
     /// Evaluate a policy on suites without changes and under each of several conditions.
     Conditions {
-        /// Name, as in results.
         name: String,
-        /// In order.
         suites: Vec<Suite>,
-        /// In order.
         conditions: Vec<Condition>,
     },
     /// Run a scripted experiment: a function of a grid of parameters that yields rows.
     Experiment {
-        /// Name, as in results.
         name: String,
-        /// Number of points of the grid.
         points: usize,
         /// Columns of the table of rows, in order; all of them, sorted, if empty.
         columns: Vec<String>,

@@ -5,7 +5,6 @@ use serde::{Deserialize, Serialize};
 /// A number of each episode that a suite measures from the true state. It changes no verdict.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Metric {
-    /// Name in records and tables.
     pub name: String,
     /// Reduction of the values of the control steps to one.
     pub over: Reduction,
@@ -15,12 +14,8 @@ pub struct Metric {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Reduction {
-    /// The last value.
     Last,
-    /// The largest value.
     Max,
-    /// The smallest value.
     Min,
-    /// The mean of the values.
     Mean,
 }

@@ -6,13 +6,12 @@ use serde_json::json;
 use crate::ShiftValue;
 use softvt_common::{digest::sha256_hex, text::significant};
 
-/// What a run changes of its suite, and the seed of its draws. Each field is the value of one flag and, under its name,
+/// Changes of a run to its suite, and the seed of its draws. Each field is the value of one flag and, under its name,
 /// a key of `run.json`.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct RunChanges {
     /// Options of the script as they were typed.
     pub arguments: Vec<String>,
-    /// Shifts by name and value.
     pub shifts: Vec<ShiftValue>,
     /// Changed settings by path and value.
     pub set: Vec<(String, String)>,
@@ -22,20 +21,16 @@ pub struct RunChanges {
     pub vary: Option<String>,
     /// Base seed; the public one of a judged run.
     pub seed: u64,
-    /// Hash of the secret of a judged run.
     pub seed_hash: Option<String>,
 }
 
-/// A suite that is derived from another.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Twin {
-    /// Soft objects are rigid.
     Rigid,
 }
 
 impl RunChanges {
-    /// True if soft objects are made rigid.
     pub fn is_rigid_twin(&self) -> bool {
         self.twin == Some(Twin::Rigid)
     }

@@ -7,69 +7,39 @@ use rand_chacha::{
     ChaCha8Rng,
     rand_core::{RngCore, SeedableRng},
 };
+use serde::Deserialize;
 use sha2::{Digest, Sha256};
 
 use softvt_common::{episode_id::EpisodeId, text::hex};
 
-/// Purpose of a stream of random numbers.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+/// Its name in lower case is part of the seed, and used by scripts.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "lowercase")]
 pub enum RandomStream {
-    /// Initial poses of objects.
     Layout,
     /// Initial joint angles of the arm.
     Arm,
     /// Variation of materials: stiffness, density and friction.
     Material,
-    /// Variation of sizes.
     Size,
-    /// Variation of colours.
     Colour,
-    /// Lights.
     Light,
-    /// Cameras.
     Camera,
-    /// Noise of sensors.
     Sensor,
-    /// Choices of the expert.
     Expert,
     /// `math.random` outside of an expert and a policy.
     Script,
-    /// Choices of a policy in Lua.
     Policy,
     /// Disturbance of the robot's motion.
     Disturbance,
     /// Properties of objects that do not show.
     Hidden,
-    /// Choices of the prompt of an episode.
     Prompt,
 }
 
 impl RandomStream {
-    /// Every stream with the name that scripts use.
-    const NAMES: [(Self, &str); 14] = [
-        (Self::Layout, "layout"),
-        (Self::Arm, "arm"),
-        (Self::Material, "material"),
-        (Self::Size, "size"),
-        (Self::Colour, "colour"),
-        (Self::Light, "light"),
-        (Self::Camera, "camera"),
-        (Self::Sensor, "sensor"),
-        (Self::Expert, "expert"),
-        (Self::Script, "script"),
-        (Self::Policy, "policy"),
-        (Self::Disturbance, "disturbance"),
-        (Self::Hidden, "hidden"),
-        (Self::Prompt, "prompt"),
-    ];
-
-    /// The stream of this name in scripts.
     pub fn from_name(name: &str) -> Option<Self> {
-        Self::NAMES.iter().find(|(_, known)| *known == name).map(|(stream, _)| *stream)
-    }
-
-    fn name(self) -> &'static str {
-        Self::NAMES[self as usize].1
+        serde_json::from_value(name.into()).ok()
     }
 }
 
@@ -85,7 +55,6 @@ impl std::fmt::Debug for SecretSeed {
 }
 
 impl SecretSeed {
-    /// The secret of a file's content.
     pub fn new(content: &[u8]) -> Self {
         Self(sha256(&[b"softvt secret seed", content]))
     }
@@ -129,27 +98,24 @@ pub struct EpisodeSeed {
     pub id: EpisodeId,
     /// Name of the layout; the tasks of a mirrored pair share it.
     pub layout: String,
-    /// Secret of a judged run.
     pub secret: Option<SecretSeed>,
 }
 
 impl EpisodeSeed {
-    /// Seed of an episode whose task has this layout.
     pub fn new(id: &EpisodeId, layout: &str) -> Self {
         Self { id: id.clone(), layout: layout.to_owned(), secret: None }
     }
 
-    /// The same seed in a judged run.
     pub fn with_secret(self, secret: Option<&SecretSeed>) -> Self {
         Self { secret: secret.cloned(), ..self }
     }
 
-    /// Random generator of a stream, at its start.
     pub fn stream(&self, stream: RandomStream) -> ChaCha8Rng {
         let EpisodeId { suite, task, episode, base_seed, split } = &self.id;
         let [task, episode, base_seed] = [task.to_string(), episode.to_string(), base_seed.to_string()];
+        let name = format!("{stream:?}").to_lowercase();
         let mut parts =
-            vec!["softvt episode", suite, &self.layout, &episode, &base_seed, split.name(), stream.name()];
+            vec!["softvt episode", suite, &self.layout, &episode, &base_seed, split.name(), &name];
         if stream == RandomStream::Hidden {
             parts.push(&task);
         }

@@ -18,9 +18,7 @@ use softvt_scene::{
 /// Ends of the range of a factor; both are positive.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct FactorRange {
-    /// Smallest factor.
     pub min: f64,
-    /// Largest factor.
     pub max: f64,
 }
 
@@ -61,7 +59,6 @@ pub struct HiddenRanges {
     pub aeration: FactorRange,
     /// Age s: Young's modulus ∝ s, stable strain ∝ s^−0.7.
     pub staling: FactorRange,
-    /// Factor on the mass.
     pub filling: FactorRange,
     /// Static friction of every pair with the object.
     pub coating: FactorRange,
@@ -72,45 +69,10 @@ pub struct HiddenRanges {
 /// No instance within the ranges of a variation can be kept, or its window is unknown.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum VariationError {
-    /// The scene has no object that the variation changes.
     #[error("has no soft object")]
     NoSoftObject,
-    /// The asset has no calibration, or none has written its draw reference.
-    #[error(
-        "asset {asset} has no calibrated window or no draw reference (assets/draws/{asset}.json), by which the variation \
-         {variation:?} selects instances; calibrate it: softvt scripts/calibrate.lua --asset {asset}"
-    )]
-    NoWindow {
-        /// Name of the asset.
-        asset: String,
-        /// Name of the variation.
-        variation: String,
-    },
-    /// The condition on the window keeps none of `MAX_DRAWS` draws.
-    #[error(
-        "variation {variation:?}: none of {MAX_DRAWS} instances of asset {asset} has a safe window with a ratio of forces in \
-         {range}; widen window_ratio, filling or coating"
-    )]
-    NoInstance {
-        /// Name of the asset.
-        asset: String,
-        /// Name of the variation.
-        variation: String,
-        /// The range of the ratio.
-        range: String,
-    },
-    /// A drawn strain is not a strain.
-    #[error(
-        "variation {variation:?}: staling gives {asset} a strain of {strain}, above 1; begin staling at 1"
-    )]
-    Strain {
-        /// Name of the asset.
-        asset: String,
-        /// Name of the variation.
-        variation: String,
-        /// The strain.
-        strain: String,
-    },
+    #[error("{0}")]
+    NoInstance(String),
 }
 
 /// Presses of an asset from which its instances are drawn.
@@ -123,12 +85,11 @@ pub struct DrawPresses {
 }
 
 /// The presses of an asset, if it has both. Only variations with hidden properties ask.
-pub type DrawPressLookup<'a> = dyn Fn(&Asset) -> Option<DrawPresses> + 'a;
+pub type DrawPressLookup<'a> = dyn Fn(&Asset) -> Result<Option<DrawPresses>, VariationError> + 'a;
 
 /// Ranges from which the objects, the light and the cameras of an episode are drawn.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct VariationRanges {
-    /// Name in results.
     pub name: String,
     /// Size of a soft object, uniform.
     pub size: FactorRange,
@@ -143,9 +104,11 @@ pub struct VariationRanges {
     /// Strength of lamp and sky, log-uniform.
     pub light: FactorRange,
     /// Largest displacement of a camera along each of its axes, m.
-    pub camera_offset_m: f64,
+    #[serde(rename = "camera_offset_m")]
+    pub camera_offset: f64,
     /// Largest rotation of a camera about each of its axes, rad.
-    pub camera_rotation_rad: f64,
+    #[serde(rename = "camera_rotation_rad")]
+    pub camera_rotation: f64,
     /// Properties that do not show.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub hidden: Option<HiddenRanges>,
@@ -154,20 +117,9 @@ pub struct VariationRanges {
 impl VariationRanges {
     /// True if every episode has the objects, the light and the cameras of its layout.
     pub fn changes_nothing(&self) -> bool {
-        let Self {
-            name: _,
-            size,
-            stiffness,
-            density,
-            friction,
-            colour,
-            light,
-            camera_offset_m,
-            camera_rotation_rad,
-            hidden,
-        } = self;
+        let Self { name: _, size, stiffness, density, friction, colour, light, hidden, .. } = self;
         [size, stiffness, density, friction, light].iter().all(|range| **range == FactorRange::ONE)
-            && [colour, camera_offset_m, camera_rotation_rad].iter().all(|largest| **largest == 0.0)
+            && [*colour, self.camera_offset, self.camera_rotation] == [0.0; 3]
             && hidden.is_none()
     }
 
@@ -204,8 +156,8 @@ impl VariationRanges {
         let mut cameras = BTreeMap::new();
         for moved in scene.cameras.iter().filter(|camera| SceneVariation::moves(camera.mount)) {
             let drawn = CameraVariation {
-                offset_m: std::array::from_fn(|_| around_zero(&mut camera, self.camera_offset_m)),
-                rotation_rad: std::array::from_fn(|_| around_zero(&mut camera, self.camera_rotation_rad)),
+                offset_m: std::array::from_fn(|_| around_zero(&mut camera, self.camera_offset)),
+                rotation_rad: std::array::from_fn(|_| around_zero(&mut camera, self.camera_rotation)),
             };
             cameras.insert(moved.name.clone(), drawn);
         }
@@ -215,9 +167,6 @@ impl VariationRanges {
 
     /// Draws `count` instances of an asset as episodes do, from streams of their own that no episode uses: the
     /// statistics of the suite, for controllers that know these but not the instance.
-    ///
-    /// # Errors
-    /// No instance can be kept.
     pub fn sample_instances(
         &self,
         suite: &str,
@@ -233,8 +182,11 @@ impl VariationRanges {
             split: EpisodeSplit::Experiment,
         };
         let mut streams = InstanceStreams::of(&EpisodeSeed::new(&id, &asset.name));
+        // The lookup takes milliseconds.
+        let presses = self.hidden.as_ref().map(|_| presses_of(asset)).transpose()?.flatten();
+        let known = |_: &Asset| Ok(presses.clone());
         (0..count)
-            .map(|_| self.draw_instance(&mut streams, asset, &InstanceFactors::NOMINAL, presses_of))
+            .map(|_| self.draw_instance(&mut streams, asset, &InstanceFactors::NOMINAL, &known))
             .collect()
     }
 
@@ -255,18 +207,22 @@ impl VariationRanges {
             hidden: None,
         };
         let Some(ranges) = &self.hidden else { return Ok(draw_material()) };
-        let names = || (asset.name.clone(), self.name.clone());
+        let (name, variation) = (&asset.name, &self.name);
         let no_window = || {
-            let (asset, variation) = names();
-            VariationError::NoWindow { asset, variation }
+            VariationError::NoInstance(format!(
+                "asset {name} has no calibrated window or no draw reference (assets/draws/{name}.json), by which the \
+                 variation {variation:?} selects instances; calibrate it: softvt scripts/calibrate.lua --asset {name}"
+            ))
         };
-        let DrawPresses { reference, calibrated } = presses_of(asset).ok_or_else(no_window)?;
+        let DrawPresses { reference, calibrated } = presses_of(asset)?.ok_or_else(no_window)?;
         for draws in 1..=MAX_DRAWS {
             let material = draw_material();
             let (drawn, mut hidden) = ranges.draw(&mut streams.hidden, material);
             if let Some(strain) = too_large(asset, hidden.strain_factor) {
-                let (asset, variation) = names();
-                return Err(VariationError::Strain { asset, variation, strain: format_number(strain) });
+                let strain = format_number(strain);
+                return Err(VariationError::NoInstance(format!(
+                    "variation {variation:?}: staling gives {name} a strain of {strain}, above 1; begin staling at 1"
+                )));
             }
             let factors = InstanceFactors {
                 scale: layout.scale * scale,
@@ -282,13 +238,11 @@ impl VariationRanges {
                 return Ok(ObjectVariation { hidden: Some(hidden), ..drawn });
             }
         }
-        let (asset, variation) = names();
-        let FactorRange { min, max } = ranges.window_ratio;
-        Err(VariationError::NoInstance {
-            asset,
-            variation,
-            range: format!("{}..{}", format_number(min), format_number(max)),
-        })
+        let [min, max] = [ranges.window_ratio.min, ranges.window_ratio.max].map(format_number);
+        Err(VariationError::NoInstance(format!(
+            "variation {variation:?}: none of {MAX_DRAWS} instances of asset {name} has a safe window with a ratio of forces \
+             in {min}..{max}; widen window_ratio, filling or coating"
+        )))
     }
 }
 
@@ -313,7 +267,6 @@ impl HiddenRanges {
     }
 }
 
-/// Streams from which instances are drawn.
 struct InstanceStreams {
     size: ChaCha8Rng,
     material: ChaCha8Rng,
@@ -328,7 +281,6 @@ impl InstanceStreams {
     }
 }
 
-/// What a layout has changed of an object.
 fn factors_in_layout(object: &Object) -> InstanceFactors {
     InstanceFactors {
         scale: object.scale,

@@ -122,21 +122,12 @@ impl RunFlags {
 
 impl ScriptArgs {
     /// The configuration of the script and the changes of its scenes.
-    ///
-    /// # Errors
-    /// A shift or setting that is not `NAME=VALUE`, or a seed file that cannot be read.
     pub(crate) fn config(self) -> Result<RunConfig, CliError> {
         let secret = self.secret.as_deref().map(read_secret).transpose()?;
         let in_file = |error: CliError| error.prefixed(self.file.display());
-        let shifts = self.shifts.iter().map(|word| parse_shift(word));
-        let shifts: Vec<ShiftValue> = shifts.collect::<Result<_, _>>().map_err(in_file)?;
-        let settings = self.settings.iter().map(|word| parse_pair("--set", word));
-        let settings: Vec<(String, String)> = settings.collect::<Result<_, _>>().map_err(in_file)?;
-        refuse_repeated("--shift", shifts.iter().map(|shift| shift.name.as_str())).map_err(in_file)?;
-        refuse_repeated("--set", settings.iter().map(|(path, _)| path.as_str())).map_err(in_file)?;
         Ok(RunConfig {
-            shifts,
-            settings,
+            shifts: parse_shifts(&self.shifts).map_err(in_file)?,
+            settings: parse_pairs("--set", &self.settings).map_err(in_file)?,
             seed: self.seed,
             secret,
             rigid_twin: self.rigid_twin,
@@ -170,7 +161,7 @@ pub(crate) struct ComparedPolicyArgs {
     connection: ConnectionArgs,
 }
 
-// How policies are connected. A doc comment would replace the description of the commands.
+// Connection of policies. A doc comment would replace the description of the commands.
 #[derive(Args, Clone, Debug)]
 pub(crate) struct ConnectionArgs {
     #[command(flatten)]
@@ -186,7 +177,7 @@ pub(crate) struct ConnectionArgs {
     timeout: Option<Duration>,
 }
 
-// What a policy sees and how it answers, wherever it runs. A doc comment would replace the description of the commands.
+// Observations and answers of a policy, wherever it runs. A doc comment would replace the description of the commands.
 #[derive(Args, Clone, Debug)]
 pub(crate) struct ProfileArgs {
     /// What a server observes and answers: a name (softvt list profiles) or a Lua file [default: visuo_tactile]
@@ -201,7 +192,6 @@ pub(crate) struct ProfileArgs {
 }
 
 impl ProfileArgs {
-    /// Options of a policy.
     pub(crate) fn options(&self) -> PolicyOptions {
         let Self { profile, gripper, name } = self.clone();
         PolicyOptions { profile, gripper, name, ..PolicyOptions::default() }
@@ -209,7 +199,6 @@ impl ProfileArgs {
 }
 
 impl ConnectionArgs {
-    /// The options of the default policy.
     fn options(&self) -> PolicyOptions {
         PolicyOptions {
             protocol: self.protocol,
@@ -220,30 +209,24 @@ impl ConnectionArgs {
     }
 }
 
-impl ComparedPolicyArgs {
-    /// The largest number of policies that are shown side by side.
-    const MAX_POLICIES: usize = 4;
+/// Largest number of policies that are shown side by side.
+const MAX_POLICIES: usize = 4;
 
+impl ComparedPolicyArgs {
     /// Loads the policies; the expert if none is named. Policies of one name get the number of their flag.
-    ///
-    /// # Errors
-    /// Too many policies, one named twice, a name for several, an option that none of them takes, or a policy
-    /// that cannot be loaded.
     pub(crate) fn load(&self) -> Result<Vec<PolicyConfig>, CliError> {
         let (options, count) = (self.connection.options(), self.policies.len());
-        if count > Self::MAX_POLICIES {
-            let most = Self::MAX_POLICIES;
-            return Err(CliError::input(format!(
-                "--policy: expected at most {most} policies side by side, got {count}; leave some out"
-            )));
+        if count > MAX_POLICIES {
+            bail!(
+                "--policy: expected at most {MAX_POLICIES} policies side by side, got {count}; leave some out"
+            );
         }
         if let Some(again) = (1..count).find(|at| self.policies[..*at].contains(&self.policies[*at])) {
             let word = self.policies[again].word();
-            return Err(CliError::input(format!("--policy {word}: named twice; name each policy once")));
+            bail!("--policy {word}: named twice; name each policy once");
         }
         if count > 1 && options.name.is_some() {
-            let message = "--name: applies to one policy; leave it out, and each is shown under its own name";
-            return Err(CliError::input(message));
+            bail!("--name: applies to one policy; leave it out, and each is shown under its own name");
         }
         let policies = if count == 0 { &[PolicySource::default()][..] } else { &self.policies };
         let load = |options| Ok(PolicyConfig::load(&options)?);
@@ -260,20 +243,15 @@ impl ComparedPolicyArgs {
 }
 
 impl PolicyArgs {
-    /// True if a policy was named.
     pub(crate) fn is_given(&self) -> bool {
         self.policy.is_some()
     }
 
-    /// The policy and its options.
     pub(crate) fn options(&self) -> PolicyOptions {
         PolicyOptions { policy: self.policy.clone().unwrap_or_default(), ..self.connection.options() }
     }
 
     /// The script with the policy of a check, which needs no server for its profile.
-    ///
-    /// # Errors
-    /// A policy or profile that cannot be loaded, or an option without effect.
     pub(crate) fn checked(&self, run: ConfiguredScript) -> Result<ConfiguredScript, CliError> {
         let of_profile = self.connection.profile.options();
         if self.policy.is_some()
@@ -340,13 +318,9 @@ pub(crate) enum ImageStorage {
 
 impl RecordingArgs {
     /// The configuration of the attempts under the expert.
-    ///
-    /// # Errors
-    /// A shift or setting that is not valid, or a secret seed.
     pub(crate) fn config(&self, script: ScriptArgs, tasks: Vec<String>) -> Result<RunConfig, CliError> {
         if script.secret.is_some() {
-            let what = "demonstrations are public, and so need no secret seed; use --seed";
-            return Err(CliError::input(format!("--seed-file: {what}")));
+            bail!("--seed-file: demonstrations are public, and so need no secret seed; use --seed");
         }
         Ok(RunConfig { tasks, threads: self.threads, ..script.config()? })
     }
@@ -365,7 +339,6 @@ impl RecordingArgs {
     }
 }
 
-/// Parses the path of an output folder.
 pub(crate) fn parse_folder(word: &str) -> Result<PathBuf, String> {
     if word.trim().is_empty() {
         return Err("expected a folder; \".\" is the working folder".to_owned());
@@ -373,7 +346,6 @@ pub(crate) fn parse_folder(word: &str) -> Result<PathBuf, String> {
     Ok(word.into())
 }
 
-/// Parses a count of 1 or more.
 pub(crate) fn parse_count<T: FromStr + From<u8> + PartialOrd>(word: &str) -> Result<T, String> {
     let count = word.parse().ok().filter(|count| *count >= T::from(1));
     count.ok_or_else(|| "expected a whole number of 1 or more".to_owned())
@@ -387,30 +359,29 @@ fn parse_seed(word: &str) -> Result<u64, String> {
     word.parse().map_err(|_| format!("expected a whole number in 0..{}", u64::MAX))
 }
 
-/// Refuses a name that is given twice, of which only the last value would count.
-fn refuse_repeated<'a>(flag: &str, names: impl Iterator<Item = &'a str>) -> Result<(), CliError> {
-    let mut seen = BTreeSet::new();
-    match names.into_iter().find(|name| !seen.insert(*name)) {
-        Some(name) => Err(CliError::input(format!("{flag} {name}: is given twice; give it once"))),
-        None => Ok(()),
-    }
-}
-
-fn parse_pair(flag: &str, word: &str) -> Result<(String, String), CliError> {
-    match word.split_once('=') {
-        Some((name, value)) if !name.is_empty() && !value.is_empty() => {
-            Ok((name.to_owned(), value.to_owned()))
+/// Names with their values. Of a name that is given twice, only the last value would count.
+fn parse_pairs(flag: &str, words: &[String]) -> Result<Vec<(String, String)>, CliError> {
+    let mut pairs: Vec<(String, String)> = Vec::new();
+    for word in words {
+        match word.split_once('=') {
+            Some((name, _)) if pairs.iter().any(|(known, _)| known == name) => {
+                bail!("{flag} {name}: is given twice; give it once")
+            }
+            Some((name, value)) if !name.is_empty() && !value.is_empty() => {
+                pairs.push((name.to_owned(), value.to_owned()));
+            }
+            _ => bail!("{flag}: expected NAME=VALUE, got {word:?}"),
         }
-        _ => Err(CliError::input(format!("{flag}: expected NAME=VALUE, got {word:?}"))),
     }
+    Ok(pairs)
 }
 
-fn parse_shift(word: &str) -> Result<ShiftValue, CliError> {
-    let (name, value) = parse_pair("--shift", word)?;
-    match value.parse::<f64>() {
+fn parse_shifts(words: &[String]) -> Result<Vec<ShiftValue>, CliError> {
+    let shift = |(name, value): (String, String)| match value.parse::<f64>() {
         Ok(number) if number.is_finite() => Ok(ShiftValue { name, value: number }),
-        _ => Err(CliError::input(format!("--shift {name}: expected a number, got {value:?}"))),
-    }
+        _ => bail!("--shift {name}: expected a number, got {value:?}"),
+    };
+    parse_pairs("--shift", words)?.into_iter().map(shift).collect()
 }
 
 fn parse_timeout(word: &str) -> Result<Duration, String> {
@@ -423,9 +394,6 @@ fn parse_name(word: &str) -> Result<String, String> {
     if is_valid { Ok(word.to_owned()) } else { Err("expected a name of 1 to 80 characters".to_owned()) }
 }
 /// The only task that the configuration selects.
-///
-/// # Errors
-/// It selects none, or several.
 pub(crate) fn select_one_task<'a>(config: &RunConfig, suite: &'a Suite) -> Result<&'a Task, CliError> {
     let tasks = select_tasks(config, suite)?;
     let [task] = tasks[..] else {
@@ -438,15 +406,11 @@ pub(crate) fn select_one_task<'a>(config: &RunConfig, suite: &'a Suite) -> Resul
 }
 
 /// The only run in a folder.
-///
-/// # Errors
-/// The folder contains no run, or several.
 pub(crate) fn load_one_run(dir: &Path) -> Result<StoredRun, CliError> {
     let mut runs = stored_run::load(dir)?;
     if runs.len() > 1 {
         let names = runs.iter().map(|run| run.dir.display().to_string()).collect::<Vec<_>>().join(", ");
-        let message = format!("{} contains several runs; select one of {names}", dir.display());
-        return Err(CliError::input(message));
+        bail!("{} contains several runs; select one of {names}", dir.display());
     }
     Ok(runs.remove(0))
 }

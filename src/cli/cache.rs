@@ -4,7 +4,6 @@ use std::{env, ffi::OsString, path::PathBuf};
 
 use etcetera::BaseStrategy;
 
-use crate::output::eprint_notice;
 use softvt_common::disk_cache::DiskCache;
 
 /// Environment variable with the folder.
@@ -29,14 +28,13 @@ pub(crate) fn is_off() -> bool {
     variable(OFF).is_some()
 }
 
-/// Makes the folder the cache of the process.
 pub(crate) fn share() {
     if let Some(folder) = folder() {
         let report = |problem: &str| {
-            eprint_notice(format!(
+            notice!(
                 "warning: {problem}; results are the same, but each start computes everything anew; set {FOLDER} to another \
                  folder, or {OFF}=1"
-            ));
+            );
         };
         DiskCache::new(folder, LIMIT, report).share();
     }

@@ -81,7 +81,6 @@ impl CliError {
         Self::new(Exit::Interrupted, message)
     }
 
-    /// Puts `prefix` and a colon before the message.
     pub(crate) fn prefixed(self, prefix: impl std::fmt::Display) -> Self {
         Self { message: format!("{prefix}: {}", self.message), ..self }
     }

@@ -4,6 +4,27 @@
 //! the command line. Runs are in the crate `softvt-runner`; this one is internal to the binary.
 #![warn(unreachable_pub)]
 
+/// Ends a function with an error of the input, which is formatted.
+macro_rules! bail {
+    ($($message:tt)*) => {
+        return Err($crate::error::CliError::input(format_args!($($message)*)))
+    };
+}
+
+/// Prints a formatted text to standard output, as [`output::print`] does.
+macro_rules! out {
+    ($($text:tt)*) => {
+        $crate::output::print(format_args!($($text)*))
+    };
+}
+
+/// Prints a formatted message to standard error, as [`output::eprint_notice`] does.
+macro_rules! notice {
+    ($($message:tt)*) => {
+        $crate::output::eprint_notice(format_args!($($message)*))
+    };
+}
+
 mod args;
 mod cache;
 mod commands;
@@ -32,9 +53,9 @@ const SHUTDOWN_TIMEOUT: Duration = Duration::from_secs(3);
 /// Runs the command line of this process and returns its exit code.
 pub fn main() -> ExitCode {
     panic::set_hook(Box::new(|info| {
-        eprint_notice(format!(
+        notice!(
             "internal error: {info}\nThis is a bug of softvt; please report it with the command that caused it."
-        ));
+        );
     }));
     let exit = match panic::catch_unwind(run_process) {
         Ok(Ok(())) => Exit::Success,
@@ -54,7 +75,7 @@ fn run_process() -> Result<(), CliError> {
     cache::share();
     let words: Vec<String> = std::env::args_os()
         .map(|word| {
-            word.into_string().map_err(|w| CliError::input(format!("argument {w:?} is not valid UTF-8")))
+            word.into_string().map_err(|w| CliError::input(format_args!("argument {w:?} is not valid UTF-8")))
         })
         .collect::<Result<_, _>>()?;
     match parse::parse(&words)? {
@@ -78,10 +99,7 @@ fn handle_interrupts() {
         }
         thread::spawn(move || {
             thread::sleep(SHUTDOWN_TIMEOUT);
-            eprint_notice(format!(
-                "interrupted; a step did not finish within {} s",
-                SHUTDOWN_TIMEOUT.as_secs()
-            ));
+            notice!("interrupted; a step did not finish within {} s", SHUTDOWN_TIMEOUT.as_secs());
             exit();
         });
     };

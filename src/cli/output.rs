@@ -31,31 +31,21 @@ use softvt_runner::{
     replay::{DemoRef, DemoReplay},
 };
 
-/// Prints to standard output with control characters escaped. A closed pipe (`| head -1`) is accepted: the reader
-/// has what it wants.
-///
-/// # Errors
-/// The text cannot be written, for example to a full disk.
-pub(crate) fn print(text: &str) -> Result<(), CliError> {
-    write_out(&text::escape_control(text))
+/// Prints to standard output with control characters escaped.
+pub(crate) fn print(text: impl fmt::Display) -> Result<(), CliError> {
+    print_table(&text::escape_control(&text.to_string()))
 }
 
-fn write_out(text: &str) -> Result<(), CliError> {
+/// Prints a table whose names have been escaped already, and which may have colours. A closed pipe (`| head -1`) is
+/// accepted: the reader has what it wants.
+pub(crate) fn print_table(table: &str) -> Result<(), CliError> {
     let mut out = io::stdout().lock();
-    match out.write_all(text.as_bytes()).and_then(|()| out.flush()) {
+    match out.write_all(table.as_bytes()).and_then(|()| out.flush()) {
         Err(error) if error.kind() != io::ErrorKind::BrokenPipe => {
-            Err(CliError::input(format!("cannot write to standard output: {error}")))
+            bail!("cannot write to standard output: {error}")
         }
         _ => Ok(()),
     }
-}
-
-/// Prints a table whose names have been escaped already, and which may have colours.
-///
-/// # Errors
-/// As [`print`].
-pub(crate) fn print_table(table: &str) -> Result<(), CliError> {
-    write_out(table)
 }
 
 /// The layout of tables for standard output: as wide as the terminal, coloured unless `NO_COLOR` is set; 80 columns and
@@ -72,11 +62,8 @@ pub(crate) fn terminal_format(has_details: bool) -> TerminalFormat {
 }
 
 /// Prints a value as indented JSON.
-///
-/// # Errors
-/// As [`print`].
 pub(crate) fn print_json(value: &impl serde::Serialize) -> Result<(), CliError> {
-    print(&format!("{:#}\n", serde_json::json!(value)))
+    out!("{:#}\n", serde_json::json!(value))
 }
 
 /// Prints for each demonstration whether its re-simulation is byte-identical, and how many reach the goal.
@@ -85,37 +72,34 @@ pub(crate) fn print_json(value: &impl serde::Serialize) -> Result<(), CliError> 
 /// A result differs (exit code 1).
 pub(crate) fn report_replays(demos: &[DemoRef], replays: &[DemoReplay]) -> Result<(), CliError> {
     for (DemoRef { file, demo }, replay) in demos.iter().zip(replays) {
-        let result = match &replay.difference {
-            None => format!("byte-identical, final state {}", replay.state_hash),
-            Some(difference) => format!("differs: {difference}"),
-        };
-        print(&format!("{} demo_{demo}: {result}\n", file.display()))?;
+        let file = file.display();
+        match &replay.difference {
+            None => out!("{file} demo_{demo}: byte-identical, final state {}\n", replay.state_hash),
+            Some(difference) => out!("{file} demo_{demo}: differs: {difference}\n"),
+        }?;
     }
     let all = demos.len();
     let identical = replays.iter().filter(|replay| replay.difference.is_none()).count();
     let reached = replays.iter().filter(|replay| replay.goal_reached).count();
     if all > 1 {
-        print(&format!(
+        out!(
             "replayed by their actions alone: {identical} of {all} byte-identical, {reached} of {all} reach the goal\n"
-        ))?;
+        )?;
     }
     if identical == all {
         return Ok(());
     }
     let differing = counted(all - identical, "demonstration");
-    Err(CliError::other_result(format!("replaying {differing} gave another result")))
+    Err(CliError::other_result(format_args!("replaying {differing} gave another result")))
 }
 
 /// Prints what a recording in the folder `out` contains. `None` is a recording that was complete before.
-///
-/// # Errors
-/// As [`print`].
 pub(crate) fn print_recording(out: &Path, summary: Option<RecordingSummary>) -> Result<(), CliError> {
     let Some(summary) = summary else {
-        eprint_notice(format!("{} is already complete", out.display()));
+        notice!("{} is already complete", out.display());
         return Ok(());
     };
-    print(&format!("{}{}\n", summary.text(), summary.manifest.display()))
+    out!("{}{}\n", summary.text(), summary.manifest.display())
 }
 
 /// The format of a file that a flag names as output.
@@ -123,7 +107,7 @@ pub(crate) struct OutputFormat {
     name: &'static str,
     /// The ending that names must have, if any.
     extension: Option<&'static str>,
-    /// What files of the format begin with, after white space.
+    /// First bytes of files of the format, after white space.
     begins: &'static [&'static [u8]],
 }
 
@@ -134,16 +118,12 @@ impl OutputFormat {
 }
 
 /// Checks before the work that the file of `flag` can be written and replaces nothing but a file of its format.
-///
-/// # Errors
-/// Its name has another ending than those of the format, another file or a folder has the name, or its folder is
-/// read-only.
 pub(crate) fn check_output_file(flag: &str, path: &Path, format: OutputFormat) -> Result<(), CliError> {
     let (file, OutputFormat { name, extension, begins }) = (path.display(), format);
     if let Some(extension) = extension
         && path.extension().is_none_or(|found| found != extension)
     {
-        return Err(CliError::input(format!("{flag} {file}: give a file that ends in .{extension}")));
+        bail!("{flag} {file}: give a file that ends in .{extension}");
     }
     let mut first = Vec::new();
     if path.is_file() {
@@ -153,9 +133,7 @@ pub(crate) fn check_output_file(flag: &str, path: &Path, format: OutputFormat) -
     // Empty files, such as those of mktemp, hold nothing to lose.
     let begins_so = || begins.iter().any(|begin| first.trim_ascii_start().starts_with(begin));
     if path.exists() && !(path.is_file() && (first.is_empty() || begins_so())) {
-        return Err(CliError::input(format!(
-            "{flag} {file}: it exists and is no {name} file; give another name"
-        )));
+        bail!("{flag} {file}: it exists and is no {name} file; give another name");
     }
     Ok(check_creatable(path)?)
 }
@@ -220,7 +198,6 @@ fn set_bar_style(bar: &ProgressBar) {
     }
 }
 
-/// Writes the time left, after a comma.
 fn write_time_left(state: &ProgressState, out: &mut dyn fmt::Write) {
     if state.pos() > 0 {
         // Writing to memory does not fail.
@@ -236,7 +213,6 @@ pub(crate) struct Progress {
     first: Option<Activity>,
     total: usize,
     done: usize,
-    /// Number of episodes by category.
     tally: BTreeMap<EpisodeCategory, usize>,
 }
 
@@ -252,7 +228,6 @@ impl Progress {
         Self { bar, first, total, done: 0, tally: BTreeMap::new() }
     }
 
-    /// There are `count` more jobs.
     pub(crate) fn expect(&mut self, count: usize) {
         self.total += count;
         if let Some(bar) = &self.bar {
@@ -261,7 +236,6 @@ impl Progress {
         }
     }
 
-    /// Counts an episode.
     pub(crate) fn judged(&mut self, category: EpisodeCategory) {
         *self.tally.entry(category).or_insert(0) += 1;
     }
@@ -272,7 +246,6 @@ impl Progress {
         self.tally.iter().map(count).collect::<Vec<_>>().join(" ")
     }
 
-    /// Reports the end of one job.
     pub(crate) fn tick(&mut self, message: &str) {
         self.done += 1;
         self.first = None;
@@ -325,21 +298,15 @@ impl Observer for Console {
     }
 
     fn expect(&self, count: usize) {
-        if let Some(progress) = &mut *lock(&self.progress) {
-            progress.expect(count);
-        }
+        lock(&self.progress).iter_mut().for_each(|progress| progress.expect(count));
     }
 
     fn advance(&self, line: &str) {
-        if let Some(progress) = &mut *lock(&self.progress) {
-            progress.tick(line);
-        }
+        lock(&self.progress).iter_mut().for_each(|progress| progress.tick(line));
     }
 
     fn judged(&self, category: EpisodeCategory) {
-        if let Some(progress) = &mut *lock(&self.progress) {
-            progress.judged(category);
-        }
+        lock(&self.progress).iter_mut().for_each(|progress| progress.judged(category));
     }
 
     fn end(&self) {

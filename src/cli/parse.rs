@@ -16,9 +16,6 @@ use softvt_common::text::{self, escape_control};
 use softvt_script::{OptionSpec, ScriptOptionValue};
 
 /// Parses the command line. Returns `None` if it asked for help or the version, which is then printed.
-///
-/// # Errors
-/// Usage errors, with suggestions for misspelled flags and values.
 pub(super) fn parse(words: &[String]) -> Result<Option<Command>, CliError> {
     if let Some(message) = misspelt_command(words) {
         return Err(CliError::input(message));
@@ -35,7 +32,7 @@ pub(super) fn parse(words: &[String]) -> Result<Option<Command>, CliError> {
     let command = with_script_options(clap_command(), &options).map_err(in_file)?;
     if words.len() <= 1 {
         text::eprint_line(short_help(command).trim_end());
-        return Err(CliError::input(""));
+        bail!("");
     }
     let flag_without_equals = flag_without_equals(&command, words);
     let matches = match command.try_get_matches_from(words) {
@@ -43,7 +40,7 @@ pub(super) fn parse(words: &[String]) -> Result<Option<Command>, CliError> {
         Err(error) if matches!(error.kind(), ErrorKind::DisplayHelp | ErrorKind::DisplayVersion) => {
             match terminal_format(false).is_coloured {
                 true => print_table(&error.render().ansi().to_string())?,
-                false => print(&error.to_string())?,
+                false => print(&error)?,
             }
             return Ok(None);
         }
@@ -59,7 +56,6 @@ pub(super) fn parse(words: &[String]) -> Result<Option<Command>, CliError> {
     parsed.map(Some).map_err(|error| in_file(usage_error(&error.to_string())))
 }
 
-/// The whole command, without options of a script.
 pub(super) fn clap_command() -> clap::Command {
     Command::augment_subcommands(RunArgs::command())
         .mut_subcommand("serve", |serve| serve.mut_arg("name", |name| name.requires("out")))
@@ -80,9 +76,7 @@ fn with_script_options(command: clap::Command, options: &[OptionSpec]) -> Result
     let args: Vec<Arg> =
         options.iter().map(|option| script_arg(option, &option.help_text(options))).collect();
     if let Some(long) = args.iter().filter_map(Arg::get_long).find(|long| flags.contains(long)) {
-        return Err(CliError::input(format!(
-            "the script declares the option --{long}, which is a flag of softvt; rename it"
-        )));
+        bail!("the script declares the option --{long}, which is a flag of softvt; rename it");
     }
     Ok(with_script_args(command, &args))
 }

@@ -15,7 +15,6 @@ pub fn withdraw() {
     FLAG.store(false, Ordering::Relaxed);
 }
 
-/// True once cancellation has been requested.
 pub fn requested() -> bool {
     FLAG.load(Ordering::Relaxed)
 }
@@ -28,12 +27,10 @@ pub struct CancelFlag(AtomicBool);
 pub static WITH_PROCESS: CancelFlag = CancelFlag::new();
 
 impl CancelFlag {
-    /// A flag without a request.
     pub const fn new() -> Self {
         Self(AtomicBool::new(false))
     }
 
-    /// Requests cancellation of the part.
     pub fn request(&self) {
         self.0.store(true, Ordering::Relaxed);
     }

@@ -28,13 +28,9 @@ use sha2::{Digest, Sha256};
 
 use crate::{parallel::lock, text::hex};
 
-/// Version of the format of the files.
 const FORMAT: u32 = 2;
-/// First bytes of every file.
 const MAGIC: &[u8; 8] = b"softvt\x00\x02";
-/// Extension of entries.
 const EXTENSION: &str = "softvt";
-/// Extension of files that are being written.
 const PARTIAL: &str = "part";
 /// Largest entry that is written or read, bytes.
 const MAX_ENTRY_BYTES: u64 = 256 << 20;
@@ -49,7 +45,6 @@ const STALE_AGE: Duration = Duration::from_secs(3600);
 /// Share of the limit that remains when entries are removed.
 const KEPT_SHARE: f64 = 0.8;
 
-/// The cache of the process, if it has one.
 static OF_PROCESS: OnceLock<DiskCache> = OnceLock::new();
 
 /// Values on disk, by kind and inputs. Clones share the folder.
@@ -88,17 +83,14 @@ pub struct CacheKey {
     hash: String,
 }
 
-/// Contents of the folder of a cache.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct CacheUsage {
-    /// Number of values.
     pub entries: usize,
     /// Their size, bytes.
     pub bytes: u64,
 }
 
 impl DiskCache {
-    /// Stores nothing.
     pub const DISABLED: Self = Self(None);
 
     /// A cache in a folder, which is created with the first entry. When the entries exceed `limit` bytes, those that
@@ -133,9 +125,6 @@ impl DiskCache {
     }
 
     /// The value of these inputs: a stored one, otherwise that of `compute`, which is stored if that took long.
-    ///
-    /// # Errors
-    /// Errors of `compute`.
     pub fn get<V: Serialize + DeserializeOwned, E>(
         &self,
         kind: &'static str,
@@ -290,7 +279,6 @@ fn write_entry(folder: &Path, name: &str, content: &[u8]) -> io::Result<()> {
     Ok(())
 }
 
-/// A file of a cache.
 struct Entry {
     path: PathBuf,
     bytes: u64,
@@ -334,16 +322,12 @@ fn is_entry(name: &str) -> bool {
     })
 }
 
-/// True for the name of an unfinished entry.
 fn is_partial(name: &str) -> bool {
     let entry = name.strip_suffix(PARTIAL).and_then(|name| name.strip_suffix('.')?.rsplit_once('.'));
     entry.is_some_and(|(entry, _)| is_entry(entry))
 }
 
 /// Number and size of the values in a folder; none if it does not exist.
-///
-/// # Errors
-/// The folder cannot be read.
 pub fn usage(folder: &Path) -> io::Result<CacheUsage> {
     let entries = list(folder)?;
     Ok(CacheUsage { entries: entries.len(), bytes: entries.iter().map(|entry| entry.bytes).sum() })

@@ -8,9 +8,7 @@ use serde::{Deserialize, Serialize};
 /// as the script and the shifts of the run are the same.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 pub struct EpisodeId {
-    /// Name of the suite.
     pub suite: String,
-    /// Index of the task in the suite.
     pub task: usize,
     /// Index of the episode in its split.
     pub episode: u32,
@@ -22,7 +20,6 @@ pub struct EpisodeId {
 }
 
 impl EpisodeId {
-    /// Position of the episode in its run.
     pub fn index(&self) -> EpisodeIndex {
         EpisodeIndex { task: self.task, episode: self.episode }
     }
@@ -32,7 +29,6 @@ impl EpisodeId {
 /// run; within it this pair suffices as a key and names the files of the episode.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 pub struct EpisodeIndex {
-    /// Index of the task in the suite.
     pub task: usize,
     /// Index of the episode in its split.
     pub episode: u32,
@@ -71,10 +67,8 @@ impl FromStr for EpisodeSplit {
 }
 
 impl EpisodeSplit {
-    /// Every split.
     pub const ALL: [Self; 3] = [Self::Validation, Self::Demonstration, Self::Experiment];
 
-    /// Name in seeds and results.
     pub fn name(self) -> &'static str {
         match self {
             Self::Validation => "validation",

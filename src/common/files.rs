@@ -15,7 +15,6 @@ use serde::Serialize;
 
 /// Error of a file operation, with the file it was about.
 #[derive(Debug, thiserror::Error)]
-#[allow(missing_docs, reason = "the messages describe the variants")]
 pub enum FileError {
     #[error("cannot {action} {path}: {source}")]
     Io { action: &'static str, path: String, source: io::Error },
@@ -46,17 +45,11 @@ pub fn create_folder(dir: &Path) -> Result<(), FileError> {
 }
 
 /// Creates the folder of a file and its missing parents.
-///
-/// # Errors
-/// As [`create_folder`].
 pub fn create_parent(path: &Path) -> Result<(), FileError> {
     create_folder(path.parent().unwrap_or(path))
 }
 
 /// Creates a folder and its missing parents, and checks that files can be created in it.
-///
-/// # Errors
-/// As [`create_folder`], or the folder is read-only.
 pub fn create_writable_folder(dir: &Path) -> Result<(), FileError> {
     create_folder(dir)?;
     let probe = dir.join(".softvt");
@@ -109,9 +102,6 @@ pub fn persist(temp: &Path, path: &Path) -> Result<(), FileError> {
 }
 
 /// Renames a file or folder. The new name is durable afterwards.
-///
-/// # Errors
-/// The system refuses.
 pub fn rename(from: &Path, to: &Path) -> Result<(), FileError> {
     fs::rename(from, to).map_err(FileError::io("replace", to))?;
     // The new name must survive a power failure as well. Systems that cannot sync folders have other means.
@@ -162,9 +152,6 @@ pub fn json_lines<T: Serialize>(
 }
 
 /// Replaces `path` by one line of JSON per item; see [`replace`].
-///
-/// # Errors
-/// As [`json_lines`], or the file cannot be written.
 pub fn write_json_lines<T: Serialize>(
     path: &Path,
     items: impl IntoIterator<Item = T>,

@@ -15,8 +15,6 @@ pub struct Journal {
     file: File,
 }
 
-/// Why a journal cannot be opened.
-#[allow(missing_docs, reason = "the messages describe the variants")]
 #[derive(Debug, thiserror::Error)]
 pub enum JournalError {
     #[error("the file exists already")]
@@ -59,9 +57,6 @@ impl Journal {
     }
 
     /// Shortens the file, whose content is `bytes`, to its whole lines.
-    ///
-    /// # Errors
-    /// The system refuses.
     pub fn keep_whole_lines(&mut self, bytes: &[u8]) -> Result<(), FileError> {
         let whole = bytes.iter().rposition(|byte| *byte == b'\n').map_or(0, |last| last + 1);
         match whole < bytes.len() {
@@ -71,18 +66,12 @@ impl Journal {
     }
 
     /// Appends and syncs a text of whole lines. A crash leaves at most one truncated line.
-    ///
-    /// # Errors
-    /// The system refuses.
     pub fn append(&mut self, lines: &str) -> Result<(), FileError> {
         self.file.write_all(lines.as_bytes()).map_err(FileError::io("write to", &self.path))?;
         self.file.sync_data().map_err(FileError::io("sync", &self.path))
     }
 
     /// Replaces the content, if it is another one. Nothing can be appended afterwards.
-    ///
-    /// # Errors
-    /// The system refuses.
     pub fn replace(&mut self, lines: &str) -> Result<(), FileError> {
         if fs::read(&self.path).map_err(FileError::io("read", &self.path))? != lines.as_bytes() {
             files::replace(&self.path, lines)?;

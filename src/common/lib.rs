@@ -2,7 +2,7 @@
 //! [`disk_cache`], SHA-256 ([`digest`]), atomic [`files`], files of finished work ([`journal`]), declarations of
 //! [`settings`](mod@settings), numpy files ([`npy`]), jobs on threads ([`parallel`]), ranges of numbers ([`range`]),
 //! [`table`]s, and numbers and [`text`] in messages.
-#![warn(missing_docs, unreachable_pub)]
+#![warn(unreachable_pub)]
 
 pub mod cancel;
 pub mod digest;

@@ -4,10 +4,10 @@
 //! `npyz` does the same and more, but brings a second version of `zip`, `pest` and `num-bigint` for little code here.
 
 use std::{
-    fmt::Write,
+    fmt::{self, Write},
     fs::File,
     io::{BufReader, Read},
-    path::{Path, PathBuf},
+    path::Path,
 };
 
 use zip::result::ZipError;
@@ -37,36 +37,15 @@ pub struct NpyArray {
     pub data: Vec<u8>,
 }
 
-/// Reasons why bytes are not an array that can be read.
+/// Reason why an array cannot be read; the message of one in an archive names the file.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[allow(missing_docs, reason = "the messages describe the variants")]
-pub enum NpyError {
-    #[error("not an .npy array")]
-    Magic,
-    #[error("its header is cut off")]
-    HeaderCutOff,
-    #[error("its header is not text")]
-    HeaderNotText,
-    #[error("is in Fortran order; save it with numpy.ascontiguousarray")]
-    FortranOrder,
-    #[error("of type '{0}'; expected numbers, little endian")]
-    Dtype(String),
-    #[error("its header has no shape")]
-    NoShape,
-    #[error("its shape is not readable")]
-    BadShape,
-    #[error("{bytes} bytes do not fill the shape {shape:?}")]
-    Length { bytes: usize, shape: Vec<usize> },
-}
+#[error("{0}")]
+pub struct NpyError(String);
 
-/// Reasons why an array of an `.npz` archive cannot be read; every message names the file.
-#[derive(Debug, thiserror::Error)]
-#[allow(missing_docs, reason = "the messages describe the variants")]
-pub enum NpzError {
-    #[error("{path}: {source}")]
-    Io { path: PathBuf, source: std::io::Error },
-    #[error("{path}: {what}")]
-    Content { path: PathBuf, what: String },
+impl NpyError {
+    pub fn new(path: &Path, reason: impl fmt::Display) -> Self {
+        Self(format!("{}: {reason}", path.display()))
+    }
 }
 
 impl NpyArray {
@@ -75,19 +54,16 @@ impl NpyArray {
         Self { dtype: "|u1".to_owned(), shape, data }
     }
 
-    /// Array of unsigned 16-bit numbers.
     pub fn from_u16(shape: Vec<usize>, values: impl IntoIterator<Item = u16>) -> Self {
         let data = values.into_iter().flat_map(u16::to_le_bytes).collect();
         Self { dtype: "<u2".to_owned(), shape, data }
     }
 
-    /// Array of single-precision numbers.
     pub fn from_f32(shape: Vec<usize>, values: impl IntoIterator<Item = f32>) -> Self {
         let data = values.into_iter().flat_map(f32::to_le_bytes).collect();
         Self { dtype: "<f4".to_owned(), shape, data }
     }
 
-    /// Array of double-precision numbers.
     pub fn from_f64(shape: Vec<usize>, values: impl IntoIterator<Item = f64>) -> Self {
         let data = values.into_iter().flat_map(f64::to_le_bytes).collect();
         Self { dtype: "<f8".to_owned(), shape, data }
@@ -130,31 +106,35 @@ impl NpyArray {
     /// # Errors
     /// The bytes are not an array, or one of another order, type or length than can be read.
     pub fn parse(bytes: &[u8]) -> Result<Self, NpyError> {
-        let rest = bytes.strip_prefix(MAGIC).ok_or(NpyError::Magic)?;
-        let (version, rest) = rest.split_first_chunk::<2>().ok_or(NpyError::HeaderCutOff)?;
+        let error = |reason: &str| NpyError(reason.to_owned());
+        let cut_off = || error("its header is cut off");
+        let rest = bytes.strip_prefix(MAGIC).ok_or_else(|| error("not an .npy array"))?;
+        let (version, rest) = rest.split_first_chunk::<2>().ok_or_else(cut_off)?;
         let (length, rest) = if version[0] == 1 {
-            let (length, rest) = rest.split_first_chunk::<2>().ok_or(NpyError::HeaderCutOff)?;
+            let (length, rest) = rest.split_first_chunk::<2>().ok_or_else(cut_off)?;
             (usize::from(u16::from_le_bytes(*length)), rest)
         } else {
-            let (length, rest) = rest.split_first_chunk::<4>().ok_or(NpyError::HeaderCutOff)?;
+            let (length, rest) = rest.split_first_chunk::<4>().ok_or_else(cut_off)?;
             (u32::from_le_bytes(*length) as usize, rest)
         };
-        let (header, data) = rest.split_at_checked(length).ok_or(NpyError::HeaderCutOff)?;
-        let header = std::str::from_utf8(header).map_err(|_| NpyError::HeaderNotText)?;
+        let (header, data) = rest.split_at_checked(length).ok_or_else(cut_off)?;
+        let header = std::str::from_utf8(header).map_err(|_| error("its header is not text"))?;
         if header.contains("'fortran_order': True") {
-            return Err(NpyError::FortranOrder);
+            return Err(error("is in Fortran order; save it with numpy.ascontiguousarray"));
         }
         let dtype = between(header, "'descr': '", "'").unwrap_or_default();
         let size = element_size(dtype).filter(|_| !dtype.starts_with('>'));
-        let size =
-            size.ok_or_else(|| NpyError::Dtype(dtype.trim_start_matches(['<', '|', '=']).to_owned()))?;
-        let lengths = between(header, "'shape': (", ")").ok_or(NpyError::NoShape)?;
+        let size = size.ok_or_else(|| {
+            let kind = dtype.trim_start_matches(['<', '|', '=']);
+            NpyError(format!("of type '{kind}'; expected numbers, little endian"))
+        })?;
+        let lengths = between(header, "'shape': (", ")").ok_or_else(|| error("its header has no shape"))?;
         let lengths = lengths.split(',').map(str::trim).filter(|n| !n.is_empty());
         let shape = lengths.map(|n| n.parse().ok()).collect::<Option<Vec<usize>>>();
-        let shape = shape.ok_or(NpyError::BadShape)?;
+        let shape = shape.ok_or_else(|| error("its shape is not readable"))?;
         let expected = shape.iter().try_fold(size, |a: usize, &b| a.checked_mul(b));
         if expected != Some(data.len()) {
-            return Err(NpyError::Length { bytes: data.len(), shape });
+            return Err(NpyError(format!("{} bytes do not fill the shape {shape:?}", data.len())));
         }
         Ok(Self { dtype: dtype.to_owned(), shape, data: data.to_vec() })
     }
@@ -190,38 +170,36 @@ fn decode(dtype: &str, bytes: &[u8]) -> f64 {
 ///
 /// # Errors
 /// Names the file and, if the file can be opened, the key.
-pub fn read_npz(path: &Path, key: &str) -> Result<NpyArray, NpzError> {
-    let content = |what: String| NpzError::Content { path: path.into(), what };
-    let file = File::open(path).map_err(|source| NpzError::Io { path: path.into(), source })?;
+pub fn read_npz(path: &Path, key: &str) -> Result<NpyArray, NpyError> {
+    let error = |reason: fmt::Arguments| NpyError::new(path, reason);
+    let of_array = |reason: &dyn fmt::Display| error(format_args!("array \"{key}\": {reason}"));
+    let file = File::open(path).map_err(|e| error(format_args!("{e}")))?;
     let mut archive = zip::ZipArchive::new(BufReader::new(file))
-        .map_err(|e| content(format!("not an .npz file, so there is no array \"{key}\": {e}")))?;
+        .map_err(|e| error(format_args!("not an .npz file, so there is no array \"{key}\": {e}")))?;
     let keys: Vec<String> =
         archive.file_names().map(|name| name.trim_end_matches(".npy").to_owned()).collect();
-    let mut entry = archive.by_name(&format!("{key}.npy")).map_err(|error| match error {
-        ZipError::FileNotFound => content(format!("no array \"{key}\"; the file has: {}", keys.join(", "))),
-        error => content(format!("array \"{key}\": {error}")),
+    let mut entry = archive.by_name(&format!("{key}.npy")).map_err(|e| match e {
+        ZipError::FileNotFound => {
+            error(format_args!("no array \"{key}\"; the file has: {}", keys.join(", ")))
+        }
+        e => of_array(&e),
     })?;
     let mut bytes = Vec::new();
-    entry
-        .read_to_end(&mut bytes)
-        .map_err(|e| content(format!("array \"{key}\": cannot be read to its end: {e}")))?;
-    NpyArray::parse(&bytes).map_err(|e| content(format!("array \"{key}\": {e}")))
+    entry.read_to_end(&mut bytes).map_err(|e| of_array(&format_args!("cannot be read to its end: {e}")))?;
+    NpyArray::parse(&bytes).map_err(|e| of_array(&e))
 }
 
 /// Reads the array `key` of the archive at `path`. Its type must be one of `kinds` (without byte
 /// order), its elements finite.
-///
-/// # Errors
-/// As [`read_npz`], or names the type, or the first element that is not finite.
-pub fn read_npz_of(path: &Path, key: &str, kinds: &[&str]) -> Result<NpyArray, NpzError> {
-    let content = |what: String| NpzError::Content { path: path.into(), what };
+pub fn read_npz_of(path: &Path, key: &str, kinds: &[&str]) -> Result<NpyArray, NpyError> {
+    let error = |reason: fmt::Arguments| Err(NpyError::new(path, format_args!("array \"{key}\": {reason}")));
     let array = read_npz(path, key)?;
     if !kinds.contains(&array.kind()) {
         let expected = kinds.join(" or ");
-        return Err(content(format!("array \"{key}\": expected type {expected}, got {}", array.kind())));
+        return error(format_args!("expected type {expected}, got {}", array.kind()));
     }
     if let Some((at, value)) = array.values().iter().enumerate().find(|(_, value)| !value.is_finite()) {
-        return Err(content(format!("array \"{key}\": entry {at} is {value}; expected a finite number")));
+        return error(format_args!("entry {at} is {value}; expected a finite number"));
     }
     Ok(array)
 }
@@ -279,11 +257,11 @@ mod tests {
     #[test]
     fn broken_arrays_are_named() {
         let whole = NpyArray::from_f32(vec![2], [1.0, 2.0]).to_npy();
-        assert_eq!(NpyArray::parse(b"hello"), Err(NpyError::Magic));
-        assert_eq!(NpyArray::parse(&whole[..9]), Err(NpyError::HeaderCutOff));
-        let cut_off = NpyArray::parse(&whole[..whole.len() - 1]);
-        assert_eq!(cut_off, Err(NpyError::Length { bytes: 7, shape: vec![2] }));
+        let error = |bytes: &[u8]| NpyArray::parse(bytes).expect_err("a broken array").to_string();
+        assert_eq!(error(b"hello"), "not an .npy array");
+        assert_eq!(error(&whole[..9]), "its header is cut off");
+        assert_eq!(error(&whole[..whole.len() - 1]), "7 bytes do not fill the shape [2]");
         let big_endian = NpyArray { dtype: ">f8".into(), ..NpyArray::from_f64(vec![1], [1.0]) };
-        assert_eq!(NpyArray::parse(&big_endian.to_npy()), Err(NpyError::Dtype(">f8".into())));
+        assert_eq!(error(&big_endian.to_npy()), "of type '>f8'; expected numbers, little endian");
     }
 }

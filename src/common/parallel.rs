@@ -174,13 +174,11 @@ impl JobQueue {
         Some(state.next - 1)
     }
 
-    /// Lets the jobs below `limit` start.
     fn allow(&self, limit: usize) {
         lock(&self.state).limit = limit;
         self.changed.notify_all();
     }
 
-    /// Lets no further job start.
     fn close(&self) {
         lock(&self.state).closed = true;
         self.changed.notify_all();

@@ -5,21 +5,16 @@ use super::text::{exact_number, format_number};
 /// Bounds of a finite number, of which either end may be excluded, and the usual values within them.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Range {
-    /// Lower bound.
     pub min: f64,
-    /// Upper bound.
     pub max: f64,
     /// True if `min` itself is refused.
     pub above_min: bool,
     /// True if `max` itself is refused.
     pub below_max: bool,
-    /// Smallest usual value.
     pub usual_min: f64,
-    /// Largest usual value.
     pub usual_max: f64,
 }
 
-/// Error of a parameter out of its range.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{path}: expected {expected}, got {value}")]
 pub struct RangeError {
@@ -32,7 +27,6 @@ pub struct RangeError {
 }
 
 impl Range {
-    /// Any finite number.
     pub const ANY: Self = Self {
         min: f64::NEG_INFINITY,
         max: f64::INFINITY,
@@ -41,9 +35,7 @@ impl Range {
         usual_min: f64::NEG_INFINITY,
         usual_max: f64::INFINITY,
     };
-    /// Greater than zero.
     pub const POSITIVE: Self = Self { min: 0.0, above_min: true, ..Self::ANY };
-    /// Zero or greater.
     pub const NOT_NEGATIVE: Self = Self::at_least(0.0);
 
     /// From `min`, included.

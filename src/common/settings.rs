@@ -23,14 +23,13 @@
 //! ```
 
 use serde::Serialize;
-use serde_json::Value;
+use serde_json::{Value, json};
 
 use super::{
     range::{Range, RangeError},
     text::exact_number,
 };
 
-/// One setting, for documentation.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Setting {
     /// Dotted path, as `--set` takes it.
@@ -39,12 +38,10 @@ pub struct Setting {
     pub default: Value,
     /// Allowed values, in words.
     pub values: String,
-    /// Meaning.
     pub about: String,
 }
 
 impl Setting {
-    /// The default in words.
     pub fn default_text(&self) -> String {
         match &self.default {
             Value::Null => "that of the scene".to_owned(),
@@ -57,8 +54,17 @@ impl Setting {
     /// All settings of a group at a path.
     pub fn list<T: SettingField + Default>(path: &str) -> Vec<Self> {
         let mut list = Vec::new();
-        T::default()
-            .describe(&SettingDeclaration { path, unit: "", range: Range::ANY, about: "" }, &mut list);
+        T::default().visit(&SettingDeclaration::group(path), &mut |declaration, value| {
+            let SettingDeclaration { path, unit, range, about } = *declaration;
+            let (default, values) = match value {
+                SettingValue::Number(number) => (json!(number), range.expected("a number", unit)),
+                SettingValue::Whole(number) => (json!(number), range.expected("a whole number", unit)),
+                SettingValue::Switch(is_on) => (json!(is_on), "true or false".to_owned()),
+                SettingValue::Word { value, values } => (json!(value), values.to_owned()),
+            };
+            let about = about.split_whitespace().collect::<Vec<_>>().join(" ");
+            list.push(Self { path: path.to_owned(), default, values, about });
+        });
         list
     }
 }
@@ -66,91 +72,80 @@ impl Setting {
 /// Unit, range and documentation of a setting.
 #[derive(Clone, Copy, Debug)]
 pub struct SettingDeclaration<'a> {
-    /// Dotted path.
     pub path: &'a str,
     /// Unit; empty for none.
     pub unit: &'a str,
-    /// Range of a number.
     pub range: Range,
-    /// Meaning.
     pub about: &'a str,
 }
 
-impl SettingDeclaration<'_> {
-    /// The setting with this default and these values.
-    pub fn setting(&self, default: impl Serialize, values: String) -> Setting {
-        let default = serde_json::to_value(default).unwrap_or_default();
-        Setting {
-            path: self.path.to_owned(),
-            default,
-            values,
-            about: self.about.split_whitespace().collect::<Vec<_>>().join(" "),
-        }
-    }
-
-    /// A setting that is `noun`, "a number" or another, within the declared range.
-    fn number(&self, default: impl Serialize, noun: &str) -> Setting {
-        self.setting(default, self.range.expected(noun, self.unit))
+impl<'a> SettingDeclaration<'a> {
+    fn group(path: &'a str) -> Self {
+        Self { path, unit: "", range: Range::ANY, about: "" }
     }
 }
 
+/// Value of a setting.
+#[derive(Clone, Copy, Debug)]
+pub enum SettingValue {
+    /// A number within the declared range.
+    Number(f64),
+    /// A whole number within the declared range; `None` where it follows from the scene.
+    Whole(Option<u64>),
+    Switch(bool),
+    /// A word, and the allowed ones in words.
+    Word {
+        value: &'static str,
+        values: &'static str,
+    },
+}
+
+/// Receives each setting of a group.
+pub type SettingVisitor<'a> = dyn FnMut(&SettingDeclaration<'_>, SettingValue) + 'a;
+
 /// A setting or a group of settings.
 pub trait SettingField {
-    /// Appends the settings that this default value stands for.
-    fn describe(&self, declaration: &SettingDeclaration<'_>, list: &mut Vec<Setting>);
+    /// Passes this value, or all values of a group, to `visitor`.
+    fn visit(&self, declaration: &SettingDeclaration<'_>, visitor: &mut SettingVisitor<'_>);
 
-    /// Checks the range of the value at a path, or of all values of a group.
-    ///
-    /// # Errors
-    /// The first value out of its range.
-    fn check_declared(&self, declaration: &SettingDeclaration<'_>) -> Result<(), RangeError>;
-
-    /// As [`Self::check_declared`], for a group at `path`.
-    ///
-    /// # Errors
-    /// The first value out of its range.
+    /// Checks the ranges of the values of a group at `path`.
     fn check(&self, path: &str) -> Result<(), RangeError> {
-        self.check_declared(&SettingDeclaration { path, unit: "", range: Range::ANY, about: "" })
+        let mut outcome = Ok(());
+        self.visit(&SettingDeclaration::group(path), &mut |declaration, value| {
+            let number = match value {
+                SettingValue::Number(number) => number,
+                SettingValue::Whole(Some(number)) => number as f64,
+                _ => return,
+            };
+            if outcome.is_ok() {
+                outcome = declaration.range.check(declaration.path, number, declaration.unit);
+            }
+        });
+        outcome
     }
 }
 
 impl SettingField for f64 {
-    fn describe(&self, declaration: &SettingDeclaration<'_>, list: &mut Vec<Setting>) {
-        list.push(declaration.number(self, "a number"));
-    }
-
-    fn check_declared(&self, declaration: &SettingDeclaration<'_>) -> Result<(), RangeError> {
-        declaration.range.check(declaration.path, *self, declaration.unit)
+    fn visit(&self, declaration: &SettingDeclaration<'_>, visitor: &mut SettingVisitor<'_>) {
+        visitor(declaration, SettingValue::Number(*self));
     }
 }
 
 impl SettingField for u32 {
-    fn describe(&self, declaration: &SettingDeclaration<'_>, list: &mut Vec<Setting>) {
-        list.push(declaration.number(self, "a whole number"));
-    }
-
-    fn check_declared(&self, declaration: &SettingDeclaration<'_>) -> Result<(), RangeError> {
-        f64::from(*self).check_declared(declaration)
+    fn visit(&self, declaration: &SettingDeclaration<'_>, visitor: &mut SettingVisitor<'_>) {
+        visitor(declaration, SettingValue::Whole(Some(u64::from(*self))));
     }
 }
 
 impl SettingField for Option<usize> {
-    fn describe(&self, declaration: &SettingDeclaration<'_>, list: &mut Vec<Setting>) {
-        list.push(declaration.number(self, "a whole number"));
-    }
-
-    fn check_declared(&self, declaration: &SettingDeclaration<'_>) -> Result<(), RangeError> {
-        self.map_or(Ok(()), |number| (number as f64).check_declared(declaration))
+    fn visit(&self, declaration: &SettingDeclaration<'_>, visitor: &mut SettingVisitor<'_>) {
+        visitor(declaration, SettingValue::Whole(self.map(|number| number as u64)));
     }
 }
 
 impl SettingField for bool {
-    fn describe(&self, declaration: &SettingDeclaration<'_>, list: &mut Vec<Setting>) {
-        list.push(declaration.setting(self, "true or false".to_owned()));
-    }
-
-    fn check_declared(&self, _: &SettingDeclaration<'_>) -> Result<(), RangeError> {
-        Ok(())
+    fn visit(&self, declaration: &SettingDeclaration<'_>, visitor: &mut SettingVisitor<'_>) {
+        visitor(declaration, SettingValue::Switch(*self));
     }
 }
 
@@ -190,29 +185,17 @@ macro_rules! settings {
         }
 
         impl $crate::settings::SettingField for $name {
-            fn describe(
+            fn visit(
                 &self,
                 declaration: &$crate::settings::SettingDeclaration<'_>,
-                list: &mut Vec<$crate::settings::Setting>,
+                visitor: &mut $crate::settings::SettingVisitor<'_>,
             ) {
                 $(
                     let path = format!("{}.{}", declaration.path, stringify!($field));
                     let about = concat!($($doc, "\n",)* "");
                     let declared = $crate::settings!(@declared path, about $($(, $unit, $range)?)?);
-                    $crate::settings::SettingField::describe(&self.$field, &declared, list);
+                    $crate::settings::SettingField::visit(&self.$field, &declared, visitor);
                 )*
-            }
-
-            fn check_declared(
-                &self,
-                declaration: &$crate::settings::SettingDeclaration<'_>,
-            ) -> Result<(), $crate::range::RangeError> {
-                $(
-                    let path = format!("{}.{}", declaration.path, stringify!($field));
-                    let declared = $crate::settings!(@declared path, "" $($(, $unit, $range)?)?);
-                    $crate::settings::SettingField::check_declared(&self.$field, &declared)?;
-                )*
-                Ok(())
             }
         }
     };

@@ -13,10 +13,8 @@ pub struct Column<'a, T: ?Sized> {
     cell: Box<dyn Fn(&T) -> String + 'a>,
 }
 
-/// Heading of a column, and its layout.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Heading {
-    /// Name of the column.
     pub text: String,
     /// True if its cells are aligned on the right, as numbers are.
     pub is_number: bool,
@@ -26,13 +24,11 @@ pub struct Heading {
 }
 
 impl<'a, T: ?Sized> Column<'a, T> {
-    /// A column of words.
     pub fn text(heading: impl Into<String>, cell: impl Fn(&T) -> String + 'a) -> Self {
         let heading = Heading { text: heading.into(), ..Heading::default() };
         Self { heading, cell: Box::new(cell) }
     }
 
-    /// A column of numbers.
     pub fn number(heading: impl Into<String>, cell: impl Fn(&T) -> String + 'a) -> Self {
         let column = Self::text(heading, cell);
         Self { heading: Heading { is_number: true, ..column.heading }, ..column }
@@ -57,16 +53,14 @@ impl<'a, T: ?Sized> Column<'a, T> {
 /// ```
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Table {
-    /// What the numbers are, above or below the table.
+    /// Meaning of the numbers, above or below the table.
     pub caption: String,
-    /// The columns.
     pub columns: Vec<Heading>,
     /// Rows, as long as there are columns; in plain text they may be shorter.
     pub rows: Vec<Vec<String>>,
 }
 
 impl Table {
-    /// The cells of some rows.
     pub fn new<'r, T: ?Sized + 'r>(
         rows: impl IntoIterator<Item = &'r T>,
         columns: impl IntoIterator<Item = Column<'r, T>>,
@@ -80,7 +74,6 @@ impl Table {
         }
     }
 
-    /// The table with a caption.
     pub fn with_caption(self, caption: impl Into<String>) -> Self {
         Self { caption: caption.into(), ..self }
     }
@@ -108,7 +101,6 @@ impl Table {
         std::iter::once(&headings).chain(&self.rows).map(line).collect()
     }
 
-    /// The headings and the rows as plain text.
     pub fn text(&self) -> String {
         self.lines().iter().flat_map(|line| [line.as_str(), "\n"]).collect()
     }

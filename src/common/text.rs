@@ -147,7 +147,6 @@ fn rank_of_word(word: &str, candidate: &str) -> Option<Rank> {
     Some(Rank { difference, edits, length: candidate.len() })
 }
 
-/// Bytes in lower-case hexadecimal, two digits each.
 pub fn hex(bytes: &[u8]) -> String {
     bytes.iter().map(|byte| format!("{byte:02x}")).collect()
 }

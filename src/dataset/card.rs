@@ -16,32 +16,23 @@ use softvt_common::files;
 use softvt_policy::profile::GripCode;
 use softvt_runs::manifest::ImportedFile;
 
-/// Demonstrations of a task.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct TaskCount {
-    /// Name of the suite.
     pub suite: String,
     /// Task index in the suite.
     pub task: usize,
-    /// Instruction.
     pub prompt: String,
-    /// Asset of the target.
     pub asset: String,
-    /// Demonstrations kept.
     pub demos: usize,
-    /// Control steps in them.
     pub samples: usize,
     /// Attempts, kept or not.
     pub attempts: usize,
     /// Rejected attempts, by reason.
     pub rejected: BTreeMap<String, usize>,
-    /// Size of the HDF5 file.
     pub hdf5_bytes: u64,
-    /// Size of its videos.
     pub video_bytes: u64,
 }
 
-/// Contents of a dataset.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct DatasetCard {
     /// Version of softvt that recorded it.
@@ -54,7 +45,6 @@ pub struct DatasetCard {
     /// True if privileged streams are stored.
     #[serde(rename = "privileged")]
     pub has_privileged: bool,
-    /// Further streams that are stored.
     #[serde(default, skip_serializing_if = "BTreeSet::is_empty")]
     pub streams: BTreeSet<OptionalStream>,
     /// Outcome of all demonstrations.
@@ -66,7 +56,6 @@ pub struct DatasetCard {
     /// Source files, if the demonstrations were imported.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub imported: Vec<ImportedFile>,
-    /// The demonstrations of each task.
     pub tasks: Vec<TaskCount>,
 }
 
@@ -82,12 +71,11 @@ pub enum KeptOutcome {
 }
 
 impl KeptOutcome {
-    /// True for [`Self::Safe`].
     pub fn is_safe(&self) -> bool {
         *self == Self::Safe
     }
 
-    /// What every demonstration does, in words.
+    /// The outcome of every demonstration, in words.
     fn words(self) -> &'static str {
         match self {
             Self::Safe => "reaches its goal and is safe by softvt's evaluator",
@@ -99,63 +87,38 @@ impl KeptOutcome {
 }
 
 impl DatasetCard {
-    /// Number of demonstrations.
     pub fn demos(&self) -> usize {
         self.tasks.iter().map(|task| task.demos).sum()
     }
 
-    /// Number of control steps.
     pub fn samples(&self) -> usize {
         self.tasks.iter().map(|task| task.samples).sum()
     }
 
     /// Checks that the lines of the manifest are of one recording, and of the tasks of this card.
-    ///
-    /// # Errors
-    /// The files of several recordings were put into one folder: a task is unknown, or seeds differ.
-    pub fn check_entries(&self, root: &Path, entries: &[ManifestEntry]) -> Result<(), DatasetError> {
-        let refuse = |index: usize, what: String| {
-            let what = format!(
-                "{what}: files of several recordings are in one folder; record their tasks together \
-                 (softvt record --task), or use each recording by itself"
-            );
-            Err(DatasetError::content(&root.join(MANIFEST), format!("line {}", index + 1), what))
-        };
-        let is_known = |entry: &ManifestEntry| {
-            self.tasks.iter().any(|task| task.task == entry.task_id && task.suite == entry.suite)
-        };
-        if let Some(index) = entries.iter().position(|entry| !is_known(entry)) {
-            let ManifestEntry { suite, task_id, .. } = &entries[index];
-            return refuse(index, format!("{suite} task {task_id}, which {DATASET} does not have"));
-        }
-        let seed = entries.first().map_or(0, |entry| entry.seed);
-        if let Some(index) = entries.iter().position(|entry| entry.seed != seed) {
-            return refuse(index, format!("seed {}, and the first line has {seed}", entries[index].seed));
-        }
-        let mut seen = BTreeSet::new();
-        let mut attempts = entries.iter().map(|entry| (entry, (&entry.suite, entry.task_id, entry.episode)));
-        match attempts.position(|(entry, attempt)| entry.origin.is_none() && !seen.insert(attempt)) {
-            Some(index) => {
-                let ManifestEntry { suite, task_id, episode, .. } = &entries[index];
-                refuse(index, format!("attempt {episode} of {suite} task {task_id} for a second time"))
-            }
-            None => Ok(()),
-        }
+    pub fn one_recording(&self, root: &Path, entries: &[ManifestEntry]) -> Result<(), DatasetError> {
+        let (mut seen, mut attempts) = (BTreeSet::new(), BTreeSet::new());
+        let foreign = entries.iter().position(|entry| {
+            let is_known =
+                self.tasks.iter().any(|task| task.task == entry.task_id && task.suite == entry.suite);
+            let is_new = seen.insert((&entry.hdf5_path, entry.demo_id));
+            // Several imported demonstrations may be of one attempt.
+            let is_new_attempt =
+                entry.origin.is_some() || attempts.insert((&entry.suite, entry.task_id, entry.episode));
+            !is_known || !is_new || !is_new_attempt || entry.seed != entries[0].seed
+        });
+        let Some(index) = foreign else { return Ok(()) };
+        let what = "files of several recordings are in one folder; record their tasks together (softvt record --task), \
+                    or use each recording by itself";
+        Err(DatasetError::content(&root.join(MANIFEST), format!("line {}", index + 1), what))
     }
 
     /// Writes both files, `dataset.json` last: its presence marks a complete dataset.
-    ///
-    /// # Errors
-    /// A file cannot be written.
     pub fn write(&self, root: &Path) -> Result<(), DatasetError> {
         files::replace(&root.join(CARD), self.page().as_bytes())?;
         Ok(files::write_json(&root.join(DATASET), self)?)
     }
 
-    /// Reads `dataset.json`.
-    ///
-    /// # Errors
-    /// The file is missing or invalid.
     pub fn read(root: &Path) -> Result<Self, DatasetError> {
         let path = root.join(DATASET);
         let text = files::read_text(&path)?;

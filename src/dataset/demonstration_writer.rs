@@ -41,7 +41,6 @@ pub struct DemonstrationWriter<'a> {
     pub store_images: bool,
     /// True to store the true state.
     pub has_privileged: bool,
-    /// Further streams of the HDF5 file.
     pub streams: &'a BTreeSet<OptionalStream>,
     /// `env_args` of the HDF5 file.
     pub environment: &'a Value,
@@ -239,7 +238,6 @@ struct StepImages {
     markers: [Markers; 2],
 }
 
-/// Renders the states of a recording.
 struct StepRenderer<'a> {
     recording: &'a mut StateRecording,
     cameras: Vec<Camera>,
@@ -247,8 +245,6 @@ struct StepRenderer<'a> {
 }
 
 impl<'a> StepRenderer<'a> {
-    /// # Errors
-    /// The scene lacks the camera `third_person` or `wrist`.
     fn new(recording: &'a mut StateRecording, has_depth: bool) -> Result<Self, DatasetError> {
         let camera = |name: &str| Ok(recording.sensors.camera(name)?.clone());
         let cameras = STANDARD_CAMERAS.into_iter().map(camera).collect::<Result<_, DatasetError>>()?;
@@ -256,9 +252,6 @@ impl<'a> StepRenderer<'a> {
     }
 
     /// Renders state `step`; `None` after the last state.
-    ///
-    /// # Errors
-    /// A sensor cannot be simulated.
     fn render(&mut self, step: usize) -> Result<Option<StepImages>, DatasetError> {
         let Some(frame) = self.recording.frames.get(step) else { return Ok(None) };
         let sensors = &mut self.recording.sensors;

@@ -8,29 +8,22 @@ use softvt_common::files::FileError;
 use softvt_media::video::VideoError;
 use softvt_rollout::SensingError;
 
-/// Error of reading, writing or rendering demonstrations. Messages name the file and the key in it.
-#[allow(missing_docs)] // The messages say what the fields are.
+/// Error of reading, writing or rendering demonstrations. Messages name the file and the key in it: a group, a dataset,
+/// an attribute or a line.
 #[derive(Debug, thiserror::Error)]
 pub enum DatasetError {
-    /// A file cannot be read or written.
     #[error(transparent)]
     File(#[from] FileError),
-    /// The file is no HDF5 file.
     #[error("{path} {what}")]
     NotHdf5 { path: String, what: String },
-    /// `key` is a group, dataset, attribute or line of the file.
     #[error("{path}: {key}: {what}")]
     Content { path: String, key: String, what: String },
-    /// The output folder cannot be used.
     #[error("{out}: {what}")]
     Output { out: String, what: String },
-    /// An image or a tactile reading cannot be computed.
     #[error(transparent)]
     Sensing(#[from] SensingError),
-    /// A video cannot be written.
     #[error(transparent)]
     Video(#[from] VideoError),
-    /// A stop was requested.
     #[error("interrupted")]
     Interrupted,
 }
@@ -62,8 +55,8 @@ impl DatasetError {
         }
     }
 
-    pub(super) fn content(path: &Path, key: impl Display, what: impl Into<String>) -> Self {
-        Self::Content { path: path.display().to_string(), key: key.to_string(), what: what.into() }
+    pub(super) fn content(path: &Path, key: impl Display, what: impl ToString) -> Self {
+        Self::Content { path: path.display().to_string(), key: key.to_string(), what: what.to_string() }
     }
 
     pub(super) fn not_recorded_by_softvt(path: &Path, key: impl Display) -> Self {

@@ -28,14 +28,11 @@ pub struct AttemptFile {
     pub target: PathBuf,
 }
 
-/// Paths of the files of a task.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct TaskPaths {
-    /// Folder of the dataset.
     pub root: PathBuf,
     /// Name of the suite, as part of a path.
     pub suite: String,
-    /// Index of the task.
     pub task: usize,
 }
 
@@ -50,7 +47,6 @@ impl TaskPaths {
         format!("hdf5/{}_demo.hdf5", self.name())
     }
 
-    /// HDF5 file.
     pub fn hdf5(&self) -> PathBuf {
         self.root.join(self.hdf5_relative())
     }
@@ -60,7 +56,6 @@ impl TaskPaths {
         format!("videos/{}/demo_{demo}_{}.mp4", self.name(), VIDEO_STREAMS[stream])
     }
 
-    /// Preview of a demonstration.
     pub fn preview(&self, demo: usize) -> PathBuf {
         self.root.join(format!("previews/{}/demo_{demo}.mp4", self.name()))
     }
@@ -71,7 +66,6 @@ impl TaskPaths {
         self.parts().join(format!("attempt_{attempt:05}.{kind}"))
     }
 
-    /// Folder of the parts.
     pub fn parts(&self) -> PathBuf {
         self.root.join(PARTS).join(self.name())
     }

@@ -6,24 +6,19 @@ use serde::{Deserialize, Serialize};
 
 use super::{
     DatasetError,
-    layout::{MANIFEST, TaskPaths, VIDEO_STREAMS},
+    layout::{DATASET, MANIFEST, RECORDING, TaskPaths, VIDEO_STREAMS},
 };
 use softvt_common::files;
 use softvt_runs::record::{DemonstrationOrigin, EpisodeRecord};
 
-/// Version of the format.
 pub const SCHEMA_VERSION: u32 = 1;
 
-/// A line of the manifest.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ManifestEntry {
-    /// [`SCHEMA_VERSION`].
     pub schema_version: u32,
-    /// Name of the suite.
     pub suite: String,
     /// The suite again, under SoftVTBench's name.
     pub task_suite: String,
-    /// Index of the task in the suite.
     pub task_id: usize,
     /// Index of the attempt in the split of demonstrations.
     pub episode: u32,
@@ -31,19 +26,14 @@ pub struct ManifestEntry {
     pub demo_id: usize,
     /// HDF5 file, relative to the dataset.
     pub hdf5_path: String,
-    /// Number of control steps.
     pub num_samples: usize,
-    /// Instruction.
     pub language: String,
-    /// Asset of the target.
     pub asset_name: String,
     /// True if it is safe; false only where `--keep goal` kept an unsafe one.
     pub success: bool,
     /// Largest peak D of a target, %; null for rigid ones.
     pub d_peak: Option<f64>,
-    /// Base seed.
     pub seed: u64,
-    /// Hash of the final state.
     pub state_hash: String,
     /// Numbers noted by the expert, such as the grip that it chose.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
@@ -89,20 +79,18 @@ impl ManifestEntry {
     }
 }
 
-/// Writes the manifest.
-///
-/// # Errors
-/// The file cannot be written.
 pub fn write(root: &Path, entries: &[ManifestEntry]) -> Result<(), DatasetError> {
     Ok(files::write_json_lines(&root.join(MANIFEST), entries)?)
 }
 
-/// Reads the manifest.
-///
 /// # Errors
 /// The file cannot be read, or a line is not an entry.
 pub fn read(root: &Path) -> Result<Vec<ManifestEntry>, DatasetError> {
     let path = root.join(MANIFEST);
+    if root.join(RECORDING).is_file() && !root.join(DATASET).is_file() {
+        let what = "it is missing; the recording was interrupted: repeat its command with --resume";
+        return Err(DatasetError::content(root, DATASET, what));
+    }
     if !path.exists() {
         let what = match root.join("meta/info.json").is_file() {
             true => {

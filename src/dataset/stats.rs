@@ -16,10 +16,8 @@ use softvt_media::{
 };
 use softvt_policy::Action;
 
-/// Columns of an action.
 const ACTION_NAMES: [&str; 7] =
     ["x (m)", "y (m)", "z (m)", "turn x (rad)", "turn y (rad)", "turn z (rad)", "closure"];
-/// Bins of a histogram.
 const BINS: usize = 24;
 
 /// Distribution of one quantity over all demonstrations.
@@ -27,17 +25,11 @@ const BINS: usize = 24;
 pub struct ColumnStatistics {
     /// Name with its unit.
     pub name: String,
-    /// Number of values.
     pub count: usize,
-    /// Smallest value.
     pub min: f64,
-    /// Mean.
     pub mean: f64,
-    /// Standard deviation.
     pub sd: f64,
-    /// Median.
     pub median: f64,
-    /// Largest value.
     pub max: f64,
     /// Counts in bins of equal width from `min` to `max`.
     pub bins: Vec<usize>,
@@ -62,9 +54,6 @@ impl ColumnStatistics {
 }
 
 /// Statistics of the actions, lengths and deformations in HDF5 files.
-///
-/// # Errors
-/// A file cannot be read.
 pub fn column_statistics(paths: &[impl AsRef<Path>]) -> Result<Vec<ColumnStatistics>, DatasetError> {
     let mut columns: [Vec<f64>; 7] = Default::default();
     let (mut lengths, mut peaks, mut soft, mut speeds) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
@@ -97,7 +86,6 @@ fn commanded_speed(from: [f64; 7], to: [f64; 7]) -> f64 {
     squares.sum::<f64>().sqrt() / CONTROL_DT
 }
 
-/// The statistics as a plain-text table.
 pub fn table(statistics: &[ColumnStatistics]) -> String {
     let number = |name, of: fn(&ColumnStatistics) -> f64| {
         Column::number(name, move |s: &ColumnStatistics| decimal(Some(of(s)), 3)).width(9)
@@ -114,7 +102,6 @@ pub fn table(statistics: &[ColumnStatistics]) -> String {
     Table::new(statistics, columns).text()
 }
 
-/// Panels of the histograms.
 const PANELS: Layout = Layout {
     columns: 4,
     panel: [280.0, 190.0],
@@ -123,7 +110,6 @@ const PANELS: Layout = Layout {
     unit: 1.0,
 };
 
-/// The histograms as an SVG image.
 pub fn svg(columns: &[ColumnStatistics]) -> String {
     let histogram = |s: &ColumnStatistics| {
         // All values may be equal.

@@ -1,4 +1,4 @@
-//! [`DataStream`]: one quantity of a demonstration over time.
+//! [`DataStream`]: a quantity of a demonstration in its control steps.
 
 use std::sync::LazyLock;
 
@@ -21,7 +21,6 @@ static OPTIONAL_STREAMS: LazyLock<Vec<OptionalStream>> = LazyLock::new(|| {
 });
 
 impl OptionalStream {
-    /// The stream of a name.
     pub fn named(name: &str) -> Option<Self> {
         OPTIONAL_STREAMS.iter().copied().find(|stream| stream.0 == name)
     }
@@ -58,10 +57,8 @@ impl<'de> Deserialize<'de> for OptionalStream {
 /// Attribute of a stream with the SHA-256 of its numbers, as they were recorded.
 pub(super) const DIGEST: &str = "sha256";
 
-/// Values of a [`DataStream`], step by step.
 #[derive(Clone, Debug, PartialEq)]
 pub enum StreamValues {
-    /// Physical quantities.
     F64(Vec<f64>),
     /// The same with half the size.
     F32(Vec<f32>),
@@ -85,14 +82,12 @@ pub struct DataStream {
 /// A rollout as training data, without its images: the state before each control step, and the action commanded in it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Demonstration {
-    /// Header and verdict of the episode.
     pub record: EpisodeRecord,
     /// All streams other than images and depth.
     pub streams: Vec<DataStream>,
 }
 
 impl StreamValues {
-    /// Numbers of a type.
     pub(super) fn new(number_type: NumberType, numbers: Vec<f64>) -> Self {
         match number_type {
             NumberType::F64 => Self::F64(numbers),
@@ -101,7 +96,6 @@ impl StreamValues {
         }
     }
 
-    /// The values as `f64`.
     pub(super) fn into_f64(self) -> Vec<f64> {
         match self {
             Self::F64(values) => values,
@@ -119,7 +113,6 @@ impl StreamValues {
         }
     }
 
-    /// Their type.
     pub(super) fn number_type(&self) -> NumberType {
         match self {
             Self::F64(_) => NumberType::F64,

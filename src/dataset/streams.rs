@@ -9,8 +9,7 @@ use softvt_evaluation::{
 };
 use softvt_geometry::Vec3;
 use softvt_policy::{
-    Action, MAX_ANGLE, NumberType, PadForce, ROBOT_STREAMS, RobotState, RobotStream, pose_row,
-    profile::GripCode,
+    Action, NumberType, PadForce, ROBOT_STREAMS, RobotState, RobotStream, pose_row, profile::GripCode,
 };
 use softvt_robot::{GripTarget, panda::ARM_DOFS, rotation};
 use softvt_rollout::{BodyConfiguration, FinishedEpisode, Sensors, StateRecording, StepTrace};
@@ -22,7 +21,6 @@ use super::{
     stream::{DataStream, StreamValues},
 };
 
-/// Declaration of a stream.
 #[derive(Clone, Debug)]
 pub(crate) struct StreamSpec {
     /// Path below the demonstration, with [`NAME`] for the name of an object.
@@ -30,8 +28,6 @@ pub(crate) struct StreamSpec {
     pub number_type: NumberType,
     /// Shape per step; lengths that differ between recordings are `None`.
     pub row: Vec<Option<usize>>,
-    /// Largest magnitude of a number.
-    pub bound: f64,
     pub presence: Presence,
     /// Text attributes: `unit`, `frame`, `meaning`, …
     pub attributes: Vec<(&'static str, &'static str)>,
@@ -43,22 +39,19 @@ pub(crate) struct StreamSpec {
 /// Recordings that have a stream.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Presence {
-    /// All.
     Always,
-    /// Those in which it says something, unless they were asked to leave it out.
+    /// Recordings in which it varies, unless they were asked to leave it out.
     Possible,
-    /// Those with this value of `--streams`.
+    /// Recordings with this value of `--streams`.
     Flag(&'static str),
 }
 
-/// How the values of a stream come about.
 #[derive(Clone, Copy, Debug)]
 enum Read {
     /// From the whole rollout, step by step.
     Rollout(fn(&Rollout<'_>) -> Option<Vec<f64>>),
     /// From the state of the robot before each action.
     Robot(fn(&RobotState) -> Vec<f64>),
-    /// Poses of a standard camera.
     Camera(usize),
     /// Configurations of the bodies of this kind.
     Bodies(fn(&BodyConfiguration<'_>) -> Option<Vec<f64>>),
@@ -66,7 +59,6 @@ enum Read {
     Rendered,
 }
 
-/// A rollout that becomes a demonstration.
 pub(crate) struct Rollout<'a> {
     finished: &'a FinishedEpisode,
     recording: &'a StateRecording,
@@ -97,7 +89,6 @@ pub(crate) const JOINT_ACTIONS: &str = "actions_joints";
 pub(crate) const COMMANDED_ROTATIONS: &str = "commanded_rotations";
 /// Name of the stream that marks actions that commanded joint positions; present if there are any.
 pub(crate) const COMMANDS_JOINTS: &str = "commands_joints";
-/// Name of the stream of markers.
 pub(crate) const MARKER_MOTION: &str = "obs/gripper_marker_motion";
 /// Shape of its rows: finger, initial and present, marker, (x, y).
 pub(crate) const MARKER_ROW: [usize; 4] = [2, 2, MARKER_COUNT, 2];
@@ -116,15 +107,6 @@ pub(crate) fn actions_in(code: GripCode) -> &'static str {
 const BASE: &str = "robot base";
 const ACTION: &str = "absolute tool position (m) and axis-angle (rad, continuous along the episode), gripper";
 const CAMERA_POSE: &str = "position, quaternion w x y z with w >= 0; x right, y up, view along -z";
-
-/// Largest grip force, N.
-const MAX_LOAD: f64 = 1e6;
-/// Largest distance of an object from the origin, m.
-const MAX_DISTANCE_M: f64 = 20.0;
-/// Largest depth that a camera sees, m.
-const MAX_DEPTH_M: f64 = 100.0;
-/// Largest coordinate of a marker, px.
-const MAX_MARKER_PX: f64 = 1e3;
 
 /// All streams in the order of the files, images and depth last.
 pub(crate) fn all() -> Vec<StreamSpec> {
@@ -148,7 +130,6 @@ pub(crate) fn named(path: &str) -> Option<StreamSpec> {
 const NAME: &str = "<name>";
 
 impl StreamSpec {
-    /// True for the path of this stream.
     pub(crate) fn is_at(&self, path: &str) -> bool {
         match self.path.split_once(NAME) {
             Some((before, after)) => path.starts_with(before) && path.ends_with(after),
@@ -161,14 +142,8 @@ impl StreamSpec {
         self.path.starts_with("privileged/")
     }
 
-    /// True for images and their depth.
     pub(crate) fn is_rendered(&self) -> bool {
         matches!(self.read, Read::Rendered)
-    }
-
-    /// True for depth, which is infinite in the background.
-    pub(crate) fn is_depth(&self) -> bool {
-        self.is_rendered() && self.number_type == NumberType::F32
     }
 
     /// Shape of the stream, in words.
@@ -208,7 +183,6 @@ fn always(
         path,
         number_type: NumberType::F64,
         row: row.iter().copied().map(Some).collect(),
-        bound: f64::INFINITY,
         presence: Presence::Always,
         attributes: Vec::new(),
         about: "",
@@ -252,10 +226,6 @@ impl StreamSpec {
         Self { number_type, ..self }
     }
 
-    fn bound(self, bound: f64) -> Self {
-        Self { bound, ..self }
-    }
-
     fn about(self, about: &'static str) -> Self {
         Self { about, ..self }
     }
@@ -267,7 +237,7 @@ fn of_robot(stream: &'static RobotStream) -> Option<StreamSpec> {
     let presence = recorded.flag.map_or(Presence::Always, Presence::Flag);
     let attributes = attributes.into_iter().filter(|(_, text)| !text.is_empty()).collect();
     let own = read_by(recorded.path, &[Some(stream.width)], Read::Robot(stream.read));
-    let own = own.number_type(recorded.number_type).bound(stream.bound).about(stream.about);
+    let own = own.number_type(recorded.number_type).about(stream.about);
     Some(StreamSpec { presence, attributes, ..own })
 }
 
@@ -276,8 +246,7 @@ fn top_level() -> Vec<StreamSpec> {
     let action = |code: GripCode, gripper, read| {
         let unit = if code == GripCode::Force { "m, rad, N" } else { "m, rad, 1" };
         let spec = always(actions_in(code), &[7], read).unit(unit).frame(BASE).meaning(ACTION);
-        let bound = if code == GripCode::Force { MAX_LOAD } else { MAX_ANGLE };
-        spec.attribute("gripper", gripper).attribute("grip_code", code.name()).bound(bound)
+        spec.attribute("gripper", gripper).attribute("grip_code", code.name())
     };
     vec![
         action(GripCode::Continuous, "continuous closure: 1 - commanded width / 0.08 m", |rollout| {
@@ -317,7 +286,6 @@ fn top_level() -> Vec<StreamSpec> {
         })
         .unit("rad")
         .meaning("the motion of the actions as commanded joint positions")
-        .bound(MAX_ANGLE)
         .about(
             "the motion of the actions as joint positions, rad: what inverse kinematics makes of the pose in that step, \
              without a disturbance, or what the policy commanded. With the gripper of one of the streams above it is an \
@@ -358,7 +326,7 @@ fn top_level() -> Vec<StreamSpec> {
 fn observed() -> Vec<StreamSpec> {
     let camera = |index: usize, path| {
         let pose = read_by(path, &[Some(7)], Read::Camera(index)).unit("m, 1").frame(BASE);
-        pose.meaning(CAMERA_POSE).bound(MAX_DISTANCE_M).about(
+        pose.meaning(CAMERA_POSE).about(
             "pose of the camera, base, with OpenGL's axes (x right, y up, view along −z); the attribute `intrinsic` is the \
              matrix for the recorded images, for OpenCV's axes: JSON as text, see below",
         )
@@ -373,7 +341,6 @@ fn observed() -> Vec<StreamSpec> {
         .number_type(NumberType::F32)
         .unit("px of the tactile picture")
         .attribute("axes", "step, finger (left, right), initial and present, marker, (x, y)")
-        .bound(MAX_MARKER_PX)
         .about("finger, initial and present, marker, (x, y) px"),
     ]
 }
@@ -390,7 +357,7 @@ fn images() -> Vec<StreamSpec> {
     };
     let depth = |path| {
         let depth = read_by(path, &[None, None], Read::Rendered).number_type(NumberType::F32).unit("m");
-        let depth = depth.attribute("axes", "step, row from the top, column").bound(MAX_DEPTH_M).about(
+        let depth = depth.attribute("axes", "step, row from the top, column").about(
             "depth along the optical axis, m; infinite in the background. About 25 kB per step of the static camera and \
              50 kB of the wrist camera, compressed",
         );
@@ -476,7 +443,6 @@ fn privileged() -> Vec<StreamSpec> {
         .number_type(NumberType::F32)
         .unit("m")
         .frame("world")
-        .bound(MAX_DISTANCE_M)
         .about("m, world"),
         read_by(
             "privileged/states/rigid_object/<name>/root_pose_w",
@@ -489,7 +455,6 @@ fn privileged() -> Vec<StreamSpec> {
         .unit("m, 1")
         .frame("world")
         .meaning("position, quaternion w x y z with w >= 0")
-        .bound(MAX_DISTANCE_M)
         .about("position, quaternion, world; also for parts of articulated objects"),
     ]
 }
@@ -523,7 +488,6 @@ impl<'a> Rollout<'a> {
         }
     }
 
-    /// Number of control steps.
     fn steps(&self) -> usize {
         self.finished.actions.len()
     }

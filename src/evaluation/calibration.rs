@@ -30,7 +30,7 @@ const MAX_SLIP_MM: f64 = 2.0;
 /// Smallest extent of a safe window, mm: the accuracy of its loose end.
 const MIN_EXTENT_MM: f64 = 0.02;
 
-/// How the sweep of a calibration is made.
+/// Tool that squeezes the object in the sweep of a calibration.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum SweepProtocol {
@@ -133,7 +133,7 @@ pub struct WindowEnd {
 }
 
 /// Safe window of an asset: from the loose end, up to which friction holds it, to the tight end, at which D reaches τ.
-/// That of an instance is an [`InstanceWindow`](super::instance::InstanceWindow).
+/// The window of an instance is an [`InstanceWindow`](super::instance::InstanceWindow).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(from = "StoredWindow", into = "StoredWindow")]
 pub struct SafeWindow {
@@ -183,7 +183,7 @@ impl From<SafeWindow> for StoredWindow {
 /// Measurements of a calibration, from which an [`Envelope`] follows.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct CalibrationMeasurements {
-    /// How the sweep was made.
+    /// Tool of the sweep.
     pub protocol: SweepProtocol,
     /// Stable strain of the material; `None` if it states no limit, and for the robot's hand.
     pub stable_strain: Option<f64>,
@@ -200,7 +200,7 @@ pub struct CalibrationMeasurements {
 /// Envelope of an asset, with the rows it was computed from.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Envelope {
-    /// How the sweep was made.
+    /// Tool of the sweep.
     pub protocol: SweepProtocol,
     /// Stable strain of the material: the smaller of its collapse and damage strain.
     pub stable_strain: Option<f64>,
@@ -218,7 +218,7 @@ pub struct Envelope {
     /// Smallest peak D of the object while it was carried, over the widths at which every trial held, %.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub carried_d_pct: Option<f64>,
-    /// The safe window.
+    /// Window of safe widths and forces.
     pub window: SafeWindow,
     /// Hold trials, by decreasing width.
     pub holds: Vec<HoldRow>,

@@ -8,7 +8,7 @@ use super::verdict::{Outcome, Verdict};
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum EpisodeCategory {
-    /// Safety Success.
+    /// The goal is reached safely.
     Safe,
     /// Goal Success with D_peak > τ of a target.
     OverLimit,
@@ -51,7 +51,7 @@ impl EpisodeCategory {
         }
     }
 
-    /// Name in results.
+    /// Name in files of results.
     pub fn name(self) -> &'static str {
         match self {
             Self::Safe => "safe",

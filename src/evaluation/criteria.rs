@@ -49,14 +49,6 @@ mod tests {
         let slip =
             SuccessCriteria { slip_m: -0.001, ..SuccessCriteria::default() }.check("criteria").unwrap_err();
         assert_eq!(slip.to_string(), "criteria.slip_m: expected a number in 0..0.5 (m), got -0.001");
-        assert!(
-            SuccessCriteria { lost_fall_m: f64::NAN, ..SuccessCriteria::default() }
-                .check("criteria")
-                .is_err()
-        );
-        assert!(
-            SuccessCriteria { support_share: 1.5, ..SuccessCriteria::default() }.check("criteria").is_err()
-        );
     }
 
     #[test]

@@ -75,7 +75,7 @@ pub struct PlaceEvidence {
 pub enum PredicateEvidence {
     /// The object that must carry a target.
     Place(PlaceEvidence),
-    /// Whether a predicate holds that is not a placement; read at the end of control steps.
+    /// True if a predicate holds that is not a placement; read at the end of control steps.
     Given(bool),
 }
 

@@ -126,7 +126,7 @@ mod tests {
     use super::*;
     use GoalNode::{All, Any, None, Predicate, Sequence};
 
-    /// Whether the goal holds after each of these control steps; the letters of a step are the predicates that hold.
+    /// True for each control step after which the goal holds; the letters of a step are the predicates that hold.
     fn run(goal: &GoalNode, steps: &[&str]) -> Vec<bool> {
         let mut monitor = GoalMonitor::new(goal.clone());
         let holds = |step: &str| "abcd".chars().map(|name| step.contains(name)).collect::<Vec<_>>();

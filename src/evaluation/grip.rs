@@ -9,7 +9,7 @@
 //!
 //! so the larger of the two is at least |L_t| / 2μ + L_n / 2. The least force of an episode is the maximum of this over
 //! the control steps in which the object is carried, with L as the mean over the control step and the dynamic μ of the
-//! pair: a grip that still holds once a pad has slid. Moments are left out: an object that is gripped beside its
+//! pair: a grip that still holds once a pad has slid. Moments are left out: an object that is gripped off its
 //! centre, or by its rim, needs more, so the least force is a lower bound and the ratio an upper one.
 //!
 //! Human grips exceed the least force by 10 to 40 % (Johansson and Westling, Experimental Brain Research 56, 1984).
@@ -25,7 +25,7 @@ pub struct GripSample {
     pub is_carried: bool,
     /// True if both pads touch it.
     pub is_held: bool,
-    /// Load and friction.
+    /// Load of the object and friction of the pair.
     pub grip: GripEvidence,
 }
 

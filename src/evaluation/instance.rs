@@ -18,7 +18,7 @@ use super::{
     safety::{DeformationLimit, round_to_six_decimals},
 };
 
-/// How an object differs from its asset.
+/// Ratios of the properties of an object to those of its asset.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct InstanceFactors {
     /// Factor on the size.
@@ -34,7 +34,7 @@ pub struct InstanceFactors {
 }
 
 impl InstanceFactors {
-    /// The asset itself.
+    /// Factors of the asset itself.
     pub const NOMINAL: Self = Self { scale: 1.0, youngs: 1.0, density: 1.0, strain: 1.0, friction: 1.0 };
 }
 
@@ -272,7 +272,7 @@ impl InstancePresses {
 pub struct DrawReference {
     /// Fingerprint of the asset without its mesh.
     pub object: String,
-    /// Its presses.
+    /// Presses of the asset and of its variants.
     pub presses: InstancePresses,
 }
 

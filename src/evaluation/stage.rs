@@ -29,7 +29,7 @@ impl TaskStage {
     pub const ALL: [Self; 6] =
         [Self::Reach, Self::Grasp, Self::Lift, Self::Carry, Self::Place, Self::Release];
 
-    /// Name in results.
+    /// Name in files of results.
     pub fn name(self) -> &'static str {
         match self {
             Self::Reach => "reach",
@@ -58,7 +58,7 @@ pub struct StageEvidence {
 /// Finds the stage of an episode.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct StageMonitor {
-    /// The present stage.
+    /// The stage that the episode is in.
     pub stage: TaskStage,
 }
 

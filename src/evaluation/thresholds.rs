@@ -26,22 +26,12 @@ pub const METHOD: &str = "compression_sweep";
 /// Differences of results from those of their rows that rounding to six decimals explains, relative to 1.
 const ROUNDING: f64 = 1.5e-6;
 
-/// Reasons why a threshold file cannot be used.
+/// A threshold file cannot be used. The text names the file and the value at fault.
 #[derive(Debug, thiserror::Error)]
-#[allow(missing_docs, reason = "the messages describe the variants")]
-pub enum ThresholdError {
-    #[error("{path}: {source}")]
-    Io { path: String, source: std::io::Error },
-    #[error("{path}: not a threshold file: {source}")]
-    Json { path: String, source: serde_json::Error },
-    #[error("{path}: {field} is {got}, expected {expected}: calibrate the asset again")]
-    Incompatible { path: String, field: &'static str, got: String, expected: String },
-    #[error("{path}: thresholds.{asset}.{field} is {value}, expected {expected}")]
-    Range { path: String, asset: String, field: &'static str, value: f64, expected: &'static str },
-    #[error(
-        "{path}: {field} is {stated}, and the rows of its sweep and hold trials give {computed}: calibrate the asset again"
-    )]
-    Contradiction { path: String, field: String, stated: String, computed: String },
+#[error("{path}: {problem}")]
+pub struct ThresholdError {
+    path: String,
+    problem: String,
 }
 
 /// Provenance of the thresholds.
@@ -49,7 +39,7 @@ pub enum ThresholdError {
 pub struct CalibrationInfo {
     /// Always [`METHOD`].
     pub method: String,
-    /// How the sweep was made; absent in released files.
+    /// Tool of the sweep; absent in released files.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub protocol: Option<SweepProtocol>,
     /// Definition of τ in words.
@@ -213,32 +203,33 @@ impl ThresholdFile {
         Self::parse_as(text, path, METRIC_ID, SCHEMA_VERSION)
     }
 
-    /// Parses a file of [`ThresholdFile::released`], as [`ThresholdFile::parse`] does.
-    ///
-    /// # Errors
-    /// As [`ThresholdFile::parse`].
-    pub fn parse_released(text: &str, path: &str) -> Result<Self, ThresholdError> {
-        Self::parse_as(text, path, V1_METRIC_ID, RELEASED_SCHEMA_VERSION)
-    }
-
     fn parse_as(
         text: &str,
         path: &str,
         metric_id: &str,
         schema_version: u32,
     ) -> Result<Self, ThresholdError> {
-        let json = |source| ThresholdError::Json { path: path.into(), source };
-        let value: Value = serde_json::from_str(text).map_err(json)?;
+        let refuse = |problem: String| ThresholdError { path: path.into(), problem };
+        let invalid = |error: serde_json::Error| refuse(format!("not a threshold file: {error}"));
+        let value: Value = serde_json::from_str(text).map_err(invalid)?;
         // First of all: for a file of another metric the error should say that, not that some field is missing.
-        if let Some(metric) = value.get("metric_id").and_then(|m| m.as_str()) {
-            check_equal(path, "metric_id", metric, metric_id)?;
+        let expected = [
+            ("metric_id", json!(metric_id)),
+            ("schema_version", json!(schema_version)),
+            ("protocol_id", json!(PROTOCOL_ID)),
+            ("calibration.method", json!(METHOD)),
+        ];
+        for (field, expected) in expected {
+            let got = value.pointer(&format!("/{}", field.replace('.', "/")));
+            if let Some(got) = got.filter(|got| **got != expected) {
+                let problem = format!("{field} is {got}, expected {expected}: calibrate the asset again");
+                return Err(refuse(problem));
+            }
         }
-        if let Some(version) = value.get("schema_version").and_then(Value::as_u64) {
-            check_equal(path, "schema_version", &version.to_string(), &schema_version.to_string())?;
-        }
-        let file: Self = serde_json::from_value(value).map_err(json)?;
-        file.validate(path)?;
-        Ok(file)
+        let file: Self = serde_json::from_value(value).map_err(invalid)?;
+        let problem =
+            |(asset, of): (&String, &AssetThreshold)| Some(format!("thresholds.{asset}.{}", of.problem()?));
+        file.thresholds.iter().find_map(problem).map_or(Ok(file), |problem| Err(refuse(problem)))
     }
 
     /// Reads a file of [`ThresholdFile::released`].
@@ -248,19 +239,13 @@ impl ThresholdFile {
     pub fn read_released(path: &Path) -> Result<Self, ThresholdError> {
         let name = path.display().to_string();
         let text = std::fs::read_to_string(path)
-            .map_err(|source| ThresholdError::Io { path: name.clone(), source })?;
-        Self::parse_released(&text, &name)
+            .map_err(|error| ThresholdError { path: name.clone(), problem: error.to_string() })?;
+        Self::parse_as(&text, &name, V1_METRIC_ID, RELEASED_SCHEMA_VERSION)
     }
 
     /// Text of the file: indented JSON with a final newline, thresholds with at most six decimals.
     pub fn to_text(&self) -> String {
         format!("{:#}\n", json!(self))
-    }
-
-    fn validate(&self, path: &str) -> Result<(), ThresholdError> {
-        check_equal(path, "protocol_id", &self.protocol_id, PROTOCOL_ID)?;
-        check_equal(path, "calibration.method", &self.calibration.method, METHOD)?;
-        self.thresholds.iter().try_for_each(|(asset, threshold)| threshold.validate(path, asset))
     }
 
     /// Checks that limits and windows are those that follow from the rows.
@@ -275,8 +260,10 @@ impl ThresholdFile {
         let Some((field, stated, computed)) = first_difference(&results(self), &results(&computed)) else {
             return Ok(());
         };
-        let [stated, computed] = [stated, computed].map(|value| value.to_string());
-        Err(ThresholdError::Contradiction { path: path.into(), field, stated, computed })
+        let problem = format!(
+            "{field} is {stated}, and the rows of its sweep and hold trials give {computed}: calibrate the asset again"
+        );
+        Err(ThresholdError { path: path.into(), problem })
     }
 }
 
@@ -303,38 +290,20 @@ fn first_difference(a: &Value, b: &Value) -> Option<(String, Value, Value)> {
 }
 
 impl AssetThreshold {
-    fn validate(&self, path: &str, asset: &str) -> Result<(), ThresholdError> {
-        let range = |field, value, expected| {
-            Err(ThresholdError::Range { path: path.into(), asset: asset.into(), field, value, expected })
-        };
-        if !(self.d_ref.is_finite() && self.d_ref > 0.0) {
-            return range("d_ref", self.d_ref, "a positive percentage");
-        }
-        if !(self.kappa > 0.0 && self.kappa <= 1.0) {
-            return range("kappa", self.kappa, "a share in 0..1, above 0");
-        }
-        // Released files round κ·D_ref after the product, so the last decimal may differ.
-        if (self.tau - round_to_six_decimals(self.kappa * self.d_ref)).abs() > 1.5e-6 {
-            return range("tau", self.tau, "kappa times d_ref");
-        }
-        // D_ref is the largest D of a stable squeeze, so without one it does not exist.
-        if self.n_stable_trials == 0 {
-            return range("n_stable_trials", 0.0, "at least 1");
-        }
-        Ok(())
+    /// The field with a value out of range, that value, and what is expected.
+    fn problem(&self) -> Option<String> {
+        let Self { tau, d_ref, kappa, n_stable_trials } = *self;
+        let fields = [
+            ("d_ref", d_ref, d_ref.is_finite() && d_ref > 0.0, "a positive percentage"),
+            ("kappa", kappa, kappa > 0.0 && kappa <= 1.0, "a share in 0..1, above 0"),
+            // Released files round κ·D_ref after the product, so the last decimal may differ.
+            ("tau", tau, (tau - round_to_six_decimals(kappa * d_ref)).abs() <= 1.5e-6, "kappa times d_ref"),
+            // D_ref is the largest D of a stable squeeze, so without one it does not exist.
+            ("n_stable_trials", f64::from(n_stable_trials), n_stable_trials > 0, "at least 1"),
+        ];
+        let (field, value, _, expected) = fields.into_iter().find(|(_, _, is_valid, _)| !is_valid)?;
+        Some(format!("{field} is {value}, expected {expected}"))
     }
-}
-
-fn check_equal(path: &str, field: &'static str, got: &str, expected: &str) -> Result<(), ThresholdError> {
-    if got == expected {
-        return Ok(());
-    }
-    Err(ThresholdError::Incompatible {
-        path: path.into(),
-        field,
-        got: format!("{got:?}"),
-        expected: format!("{expected:?}"),
-    })
 }
 
 /// `<asset>.sweep.jsonl`: the sweep rows of an asset in the fields of SoftVTBench's sweeps, and more: `d_peak` is D of
@@ -396,27 +365,19 @@ mod tests {
         let refused = |from: &str, to: &str| {
             ThresholdFile::parse(&text.replace(from, to), "bun.json").unwrap_err().to_string()
         };
-        assert_eq!(
-            refused(METRIC_ID, "raw_displacement"),
-            format!(
-                "bun.json: metric_id is \"raw_displacement\", expected \"{METRIC_ID}\": calibrate the asset again"
-            )
-        );
-        assert!(
-            refused(METHOD, "expert_demos").starts_with("bun.json: calibration.method is \"expert_demos\"")
-        );
-        assert!(
-            refused("\"schema_version\": 2", "\"schema_version\": 3").contains("schema_version is \"3\"")
-        );
-        let first = refused("\"schema_version\": 2", "\"schema_version\": 1");
-        assert!(
-            first.ends_with("expected \"2\": calibrate the asset again"),
-            "envelopes in closures: {first}"
-        );
-        assert!(refused("0.166667", "0.3").contains("thresholds.bun.tau is 0.3"));
-        assert!(refused("\"d_ref\": 0.333333", "\"d_ref\": -1").contains("thresholds.bun.d_ref is -1"));
-        assert!(refused("\"n_stable_trials\": 2", "\"n_stable_trials\": 0").contains("n_stable_trials is 0"));
-        assert!(refused("{", "").contains("not a threshold file"));
+        for (from, to, message) in [
+            (METRIC_ID, "raw_displacement", "metric_id is \"raw_displacement\", expected \""),
+            (METHOD, "expert_demos", "calibration.method is \"expert_demos\""),
+            ("\"schema_version\": 2", "\"schema_version\": 3", "schema_version is 3"),
+            ("\"schema_version\": 2", "\"schema_version\": 1", "expected 2: calibrate the asset again"),
+            ("0.166667", "0.3", "thresholds.bun.tau is 0.3"),
+            ("\"d_ref\": 0.333333", "\"d_ref\": -1", "thresholds.bun.d_ref is -1"),
+            ("\"n_stable_trials\": 2", "\"n_stable_trials\": 0", "n_stable_trials is 0"),
+            ("{", "", "not a threshold file"),
+        ] {
+            let found = refused(from, to);
+            assert!(found.starts_with("bun.json: ") && found.contains(message), "{found}");
+        }
         let missing = ThresholdFile::read_released(Path::new("/nowhere/bun.json")).unwrap_err().to_string();
         assert!(missing.starts_with("/nowhere/bun.json: "), "{missing}");
     }
@@ -479,7 +440,10 @@ mod tests {
         assert_eq!((bun.d_ref, bun.tau, limit.tau_pct()), (0.4, 0.2, 0.2));
         let refused = ThresholdFile::parse(&text, "thresholds.json").unwrap_err().to_string();
         assert!(refused.starts_with(&format!("thresholds.json: metric_id is {V1_METRIC_ID:?}")), "{refused}");
-        assert_eq!(ThresholdFile::parse_released(&text, "thresholds.json").unwrap(), released);
+        assert_eq!(
+            ThresholdFile::parse_as(&text, "thresholds.json", V1_METRIC_ID, RELEASED_SCHEMA_VERSION).unwrap(),
+            released
+        );
     }
 
     #[test]

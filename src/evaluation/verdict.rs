@@ -246,7 +246,7 @@ pub struct Verdict {
     pub safety_known: bool,
     /// Safety at each κ of the sensitivity table, with the limit of the object.
     pub kappas: Vec<KappaVerdict>,
-    /// The objects that the task moves, *the object* first; at least one. Files have the keys of the first beside
+    /// The objects that the task moves, *the object* first; at least one. Files have the keys of the first next to
     /// those of the episode, and the others in a list `targets`.
     #[serde(default)]
     pub targets: Vec<TargetVerdict>,
@@ -261,7 +261,7 @@ pub struct Verdict {
 }
 
 impl Verdict {
-    /// The first target.
+    /// The first target, *the object*.
     pub fn object(&self) -> &TargetVerdict {
         &self.targets[0]
     }

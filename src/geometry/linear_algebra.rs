@@ -6,7 +6,7 @@ use nalgebra::{RealField, Vector3};
 pub type Vec3 = nalgebra::Vector3<f64>;
 /// A 3×3 matrix.
 pub type Mat3 = nalgebra::Matrix3<f64>;
-/// A unit quaternion.
+/// A rotation, as a unit quaternion.
 pub type Quat = nalgebra::UnitQuaternion<f64>;
 /// A rigid transform (rotation and translation) from one frame to another.
 pub type Pose = nalgebra::Isometry3<f64>;

@@ -213,14 +213,19 @@ mod tests {
         assert_eq!(check(&[block, cuboid([0.001, 0.002, 0.02], [0.01; 3], false)]), Ok(()), "on its face");
     }
 
+    /// Checks the answer for pieces, also when they are turned, so that coinciding sides differ by rounding.
+    fn check_turned(what: &str, parts: &[Mesh], expected: Result<(), MeshError>) {
+        let turn = nalgebra::Rotation3::from_scaled_axis(Vec3::new(0.3, 0.5, 0.7));
+        let turned =
+            |part: &Mesh| Mesh { vertices: part.vertices.iter().map(|p| turn * p).collect(), ..part.clone() };
+        assert_eq!(check(parts), expected, "{what}");
+        assert_eq!(check(&parts.iter().map(turned).collect::<Vec<_>>()), expected, "{what}, turned");
+    }
+
     #[test]
     fn pieces_that_overlap_are_refused_where_their_sides_coincide() {
         let refused = |what: &str, one: Mesh, other: Mesh| {
-            let parts = [one, other];
-            assert_eq!(check(&parts), Err(MeshError::Overlap), "{what}");
-            let parts =
-                parts.map(|part| Mesh { vertices: part.vertices.iter().map(turned).collect(), ..part });
-            assert_eq!(check(&parts), Err(MeshError::Overlap), "{what}, turned");
+            check_turned(what, &[one, other], Err(MeshError::Overlap));
         };
         let solid = |x: f64, size: [f64; 3]| cuboid([x, 0.0, 0.0], size, false);
         let cube = || solid(0.0, [0.02; 3]);
@@ -247,19 +252,9 @@ mod tests {
         );
     }
 
-    /// Turned about a diagonal, after which coordinates of coinciding sides differ by rounding.
-    fn turned(p: &Vec3) -> Vec3 {
-        nalgebra::Rotation3::from_scaled_axis(Vec3::new(0.3, 0.5, 0.7)) * p
-    }
-
     #[test]
     fn pieces_that_touch_are_accepted() {
-        let accepted = |what: &str, parts: &[Mesh]| {
-            assert_eq!(check(parts), Ok(()), "{what}");
-            let turned =
-                |part: &Mesh| Mesh { vertices: part.vertices.iter().map(turned).collect(), ..part.clone() };
-            assert_eq!(check(&parts.iter().map(turned).collect::<Vec<_>>()), Ok(()), "{what}, turned");
-        };
+        let accepted = |what: &str, parts: &[Mesh]| check_turned(what, parts, Ok(()));
         let solid = |x: f64, size: [f64; 3]| cuboid([x, 0.0, 0.0], size, false);
         let cube = || solid(0.0, [0.02; 3]);
         accepted("a smaller face", &[cube(), solid(0.015, [0.01; 3])]);

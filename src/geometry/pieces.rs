@@ -48,7 +48,7 @@ impl SeparatePieces {
 
     /// The pieces of the [`voxel_mesh`] of a shape; `None` if it is connected or cannot be made.
     pub fn of_shape(shape: &Shape, spec: &VoxelSpec) -> Option<Self> {
-        let grid = VoxelGrid::covering(shape, spec).ok()?;
+        let grid = VoxelGrid::covering(shape, &shape.bounds(), spec).ok()?;
         if is_connected(&grid.elements(shape), grid.grid) {
             return None;
         }

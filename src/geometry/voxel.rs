@@ -161,7 +161,19 @@ pub const MAX_EXTRAPOLATION: f64 = 0.3;
 /// # Ok::<(), softvt_geometry::voxel::VoxelMeshError>(())
 /// ```
 pub fn voxel_mesh(shape: &Shape, spec: &VoxelSpec) -> Result<VoxelMesh, VoxelMeshError> {
-    let VoxelGrid { edge, grid, origin } = VoxelGrid::covering(shape, spec)?;
+    voxel_mesh_within(shape, &shape.bounds(), spec)
+}
+
+/// As [`voxel_mesh`], of a shape whose tight bounds are known: the search for them can take as long as the mesh.
+///
+/// # Errors
+/// As [`voxel_mesh`].
+pub fn voxel_mesh_within(
+    shape: &Shape,
+    bounds: &Aabb,
+    spec: &VoxelSpec,
+) -> Result<VoxelMesh, VoxelMeshError> {
+    let VoxelGrid { edge, grid, origin } = VoxelGrid::covering(shape, bounds, spec)?;
     let mut mesh = VoxelMesh {
         edge,
         nodes: Vec::new(),
@@ -197,12 +209,11 @@ pub(super) struct VoxelGrid {
 
 impl VoxelGrid {
     /// The grid of [`voxel_mesh`].
-    pub(super) fn covering(shape: &Shape, spec: &VoxelSpec) -> Result<Self, VoxelMeshError> {
+    pub(super) fn covering(shape: &Shape, bounds: &Aabb, spec: &VoxelSpec) -> Result<Self, VoxelMeshError> {
         shape.validate()?;
         if !(1..=MAX_RESOLUTION).contains(&spec.resolution) {
             return Err(VoxelMeshError::Resolution(spec.resolution));
         }
-        let bounds = shape.bounds();
         let edge = bounds.size().max() / spec.resolution as f64;
         if !(edge > 0.0 && edge.is_finite()) {
             return Err(VoxelMeshError::Empty);

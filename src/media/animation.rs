@@ -18,17 +18,12 @@ const BITS: usize = 6;
 /// Number of colours that are distinguished.
 const BINS: usize = 1 << (3 * BITS);
 
-/// Why an animation cannot be written.
-#[allow(missing_docs)] // The messages say what the fields are.
 #[derive(Debug, thiserror::Error)]
 pub enum AnimationError {
-    /// There is no frame.
     #[error("the animation has no frames")]
     Empty,
-    /// The frames have different sizes.
     #[error("frame {index} of the animation has another size than its still picture")]
     Size { index: usize },
-    /// The encoder failed.
     #[error("cannot encode the animation: {0}")]
     Encoding(#[from] png::EncodingError),
 }
@@ -113,7 +108,6 @@ impl Palette {
         Self { colours, nearest }
     }
 
-    /// The palette of a PNG file.
     fn bytes(&self) -> Vec<u8> {
         let mut bytes: Vec<u8> = self.colours.iter().flatten().copied().collect();
         bytes.resize(3 * 256, 0);
@@ -148,7 +142,6 @@ impl ColourCount {
     }
 }
 
-/// Mean colour of a box.
 fn mean(colours: &Vec<ColourCount>) -> Rgb8 {
     let mut all = ColourCount::default();
     for count in colours {
@@ -177,7 +170,6 @@ fn median_cut(colours: Vec<ColourCount>, most: usize) -> Vec<Vec<ColourCount>> {
     boxes
 }
 
-/// The longest side of a box of colours.
 struct Side {
     channel: usize,
     extent: u8,

@@ -9,14 +9,11 @@ const DECIMALS: std::ops::Range<f64> = 1e-4..1e6;
 /// Share of the extent of the values that a linear axis around them adds at both ends.
 const PADDING: f64 = 0.04;
 
-/// An axis with its labels.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Axis {
     /// Title, with the unit; empty for none.
     pub label: String,
-    /// Place of each value.
     pub scale: Scale,
-    /// Labelled values.
     pub ticks: Vec<Tick>,
     /// True for a line across the chart at each tick.
     pub has_grid: bool,
@@ -41,14 +38,10 @@ pub enum Scale {
     },
 }
 
-/// A labelled value.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Tick {
-    /// The value.
     pub value: f64,
-    /// Its label.
     pub label: String,
-    /// Colour of the label.
     pub tone: Tone,
 }
 
@@ -69,7 +62,6 @@ impl Scale {
 }
 
 impl Axis {
-    /// A linear axis with at most `intervals` intervals.
     pub fn linear(label: &str, from: f64, to: f64, intervals: usize) -> Self {
         let step = tick_step((to - from).abs(), intervals);
         let is_decimal = from.abs().max(to.abs()) == 0.0 || DECIMALS.contains(&from.abs().max(to.abs()));
@@ -123,7 +115,7 @@ impl Axis {
         }
     }
 
-    /// An axis of counts, logarithmic where rare ones would not be seen beside frequent ones.
+    /// An axis of counts, logarithmic if rare ones would not be visible next to frequent ones.
     pub fn counts(counts: &[usize], intervals: usize) -> Self {
         /// Ratio of the largest to the smallest count from which the axis is logarithmic.
         const LOG_RATIO: f64 = 50.0;

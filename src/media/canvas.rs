@@ -17,23 +17,16 @@ const TITLE_SIZE: f32 = 12.0;
 /// Dashes of the curves of a chart in turn, units; 0 is a solid line.
 const DASHES: [f32; 4] = [0.0, 5.0, 1.5, 10.0];
 
-/// Colours of drawings on a canvas.
 #[derive(Clone, Copy, Debug)]
 pub struct CanvasColours {
-    /// Text.
     pub ink: Rgb8,
-    /// Axes and their labels.
     pub faint: Rgb8,
-    /// Safe.
     pub safe: Rgb8,
-    /// Over the limit.
     pub harm: Rgb8,
-    /// Ground of texts.
     pub ground: Rgb8,
 }
 
 impl CanvasColours {
-    /// A colour of the palette.
     pub fn of(&self, tone: Tone) -> Rgb8 {
         match tone {
             Tone::Ink => self.ink,
@@ -51,7 +44,6 @@ pub struct Canvas {
 }
 
 impl Canvas {
-    /// An empty canvas, at least one pixel large.
     pub fn new(width: u32, height: u32, background: Rgb8) -> Self {
         // Pixmaps cannot be empty or larger than memory allows; no caller asks for either.
         let pixels = Pixmap::new(width.max(1), height.max(1)).or_else(|| Pixmap::new(1, 1));
@@ -60,7 +52,6 @@ impl Canvas {
         Self { pixels, font: FontRef::try_from_slice(epaint_default_fonts::UBUNTU_LIGHT).ok() }
     }
 
-    /// A canvas that shows `image`.
     pub fn from_image(image: &RgbImage) -> Self {
         let mut canvas = Self::new(image.width(), image.height(), [0; 3]);
         canvas.place(image, 0, 0);
@@ -205,7 +196,6 @@ impl Canvas {
         }
     }
 
-    /// Copies the pixels to an image.
     pub fn to_image(&self) -> RgbImage {
         let (width, height) = (self.pixels.width(), self.pixels.height());
         let rgb = |pixel: &[u8]| [pixel[0], pixel[1], pixel[2]];

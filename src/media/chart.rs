@@ -18,29 +18,22 @@ const NAME_HEIGHT: f32 = 13.0;
 /// Values over two axes.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Chart {
-    /// Title above the chart.
     pub title: String,
-    /// Horizontal axis.
     pub x: Axis,
-    /// Vertical axis.
     pub y: Axis,
-    /// What is drawn, in this order. Values beyond the ends of an axis are drawn at them.
+    /// Parts in the order in which they are drawn. Values beyond the ends of an axis are drawn at them.
     pub marks: Vec<Mark>,
 }
 
-/// A part of a chart.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Mark {
     /// A range of the horizontal axis.
     Band {
-        /// One end.
         from: f64,
-        /// The other end.
         to: f64,
         /// Text in the band where it does not hold what it seems to; the band is then hatched.
         objection: Option<&'static str>,
     },
-    /// All values above one.
     Above(f64),
     /// An interval of values over a range of the horizontal axis.
     Interval {
@@ -51,23 +44,17 @@ pub enum Mark {
     },
     /// A value of the vertical axis, with a text at its left end.
     Level {
-        /// The value.
         y: f64,
-        /// The text.
         label: String,
     },
     /// A value of the horizontal axis, with a text above the chart.
     Guide {
-        /// The value.
         x: f64,
-        /// The text.
         label: String,
     },
     /// A value of the horizontal axis, with a text in the chart.
     Event {
-        /// The value.
         x: f64,
-        /// The text.
         label: String,
     },
     /// Points, and a line through them.
@@ -76,7 +63,6 @@ pub enum Mark {
     Bars(Vec<usize>),
 }
 
-/// Points of a chart.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Curve {
     /// Name at the last point; empty for none.
@@ -87,12 +73,9 @@ pub struct Curve {
     pub stroke: Option<Stroke>,
 }
 
-/// A point of a chart.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ChartPoint {
-    /// Value on the horizontal axis.
     pub x: f64,
-    /// Value on the vertical axis.
     pub y: f64,
     /// Its symbol; none for a point of a line.
     pub symbol: Option<Symbol>,
@@ -118,7 +101,6 @@ impl Frame {
 }
 
 impl Chart {
-    /// The chart as elements of a drawing.
     pub fn elements(&self, frame: &Frame) -> Vec<Element> {
         let names = self.names(frame).into_iter().map(|element| element.shifted(frame.area.right));
         self.contents(frame).into_iter().chain(names).collect()
@@ -246,7 +228,7 @@ impl Chart {
         }
     }
 
-    /// The names of the curves beside their last points, moved apart where they would overlap; x is from the right
+    /// The names of the curves next to their last points, moved apart where they would overlap; x is from the right
     /// edge of the area.
     pub fn names(&self, frame: &Frame) -> Vec<Element> {
         let named = self.marks.iter().filter_map(|mark| match mark {
@@ -275,7 +257,6 @@ impl Chart {
     }
 }
 
-/// The titles of the axes of an area.
 fn axis_titles(frame: &Frame, x: &str, y: &str) -> impl Iterator<Item = Element> {
     let Area { left, right, top, bottom } = frame.area;
     let below = at(left + 0.5 * (right - left), bottom + frame.px(33.0));
@@ -316,18 +297,13 @@ pub struct Layout {
 /// Margins, px.
 #[derive(Clone, Copy, Debug)]
 pub struct Margins {
-    /// Left margin.
     pub left: f32,
-    /// Upper margin.
     pub top: f32,
-    /// Right margin.
     pub right: f32,
-    /// Lower margin.
     pub bottom: f32,
 }
 
 impl Layout {
-    /// One chart.
     pub const SINGLE: Self = Self {
         columns: 1,
         panel: [640.0, 360.0],

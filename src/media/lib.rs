@@ -1,7 +1,7 @@
 //! Charts ([`chart`]) with their axes ([`axis`]) as elements of a drawing ([`drawing`]), which SVG images ([`svg`]) and
 //! pixels ([`canvas`]) show in the colours of all results ([`palette`]); files of images ([`jpeg`]) and of moving
 //! pictures ([`video`], [`animation`]).
-#![warn(missing_docs, unreachable_pub)]
+#![warn(unreachable_pub)]
 
 pub mod animation;
 pub mod axis;

@@ -6,9 +6,7 @@
 /// A colour on light and on dark ground, as CSS has it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Colour {
-    /// On light ground.
     pub light: &'static str,
-    /// On dark ground.
     pub dark: &'static str,
 }
 
@@ -18,15 +16,10 @@ const fn colour(light: &'static str, dark: &'static str) -> Colour {
 
 /// Safe, and the curve of a plot with one curve.
 pub const SAFE: Colour = colour("#0072b2", "#56b4e9");
-/// Over the limit.
 pub const OVER_LIMIT: Colour = colour("#d55e00", "#ff8a3d");
-/// Dropped.
 pub const DROPPED: Colour = colour("#cc79a7", "#cc79a7");
-/// Goal missed, invalid, and marks beside the main ones.
+/// Goal missed, invalid, and marks next to the main ones.
 pub const FAINT: Colour = colour("#6b7280", "#9aa1ab");
-/// Text and axes.
 pub const INK: Colour = colour("#1c2024", "#e6e8eb");
-/// Grid lines.
 pub const RULE: Colour = colour("#d5d9de", "#3a4047");
-/// Ground.
 pub const GROUND: Colour = colour("#ffffff", "#16181b");

@@ -30,7 +30,6 @@ fn style() -> String {
     )
 }
 
-/// The rules about colours.
 fn colour_rules(of: fn(&Colour) -> &'static str) -> String {
     let colours =
         [palette::INK, palette::RULE, palette::GROUND, palette::FAINT, palette::SAFE, palette::OVER_LIMIT];

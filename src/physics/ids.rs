@@ -50,6 +50,10 @@ typed_id! {
     /// Index of a collider in its world.
     ColliderId
 }
+typed_id! {
+    /// Nodes of a soft body that are bonded to another body.
+    AttachmentId
+}
 
 /// A link of an articulation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -101,7 +105,7 @@ impl From<LinkId> for BodyId {
 /// The other side of a contact. A soft body touches with its own surface, everything else with colliders.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum ContactPartner {
-    /// A collider.
+    /// A collider of any body but a soft one.
     Collider(ColliderId),
     /// The surface of a soft body.
     Soft(SoftId),

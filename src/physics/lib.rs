@@ -15,7 +15,9 @@ mod solver;
 mod sparse;
 pub mod world;
 
-pub use ids::{ArticulationId, BodyId, ColliderId, ContactPartner, KinematicId, LinkId, RigidId, SoftId};
+pub use ids::{
+    ArticulationId, AttachmentId, BodyId, ColliderId, ContactPartner, KinematicId, LinkId, RigidId, SoftId,
+};
 pub use params::{PhysicsParams, STANDARD_GRAVITY};
 pub use solver::SolverStats;
 pub use world::World;

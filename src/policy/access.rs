@@ -13,14 +13,11 @@ use tungstenite::{
 
 use super::http::Refusal;
 
-/// The rules of a server.
 #[derive(Clone, Debug)]
 pub struct AccessRules {
     /// Name or address as given by the user.
     host: String,
-    /// Address on which the server listens.
     address: IpAddr,
-    /// Token that clients have to send.
     token: Option<String>,
 }
 
@@ -38,7 +35,7 @@ impl AccessRules {
     pub fn check(&self, request: &Request) -> Result<(), Refusal> {
         let headers = request.headers();
         let host = text(headers, &header::HOST).unwrap_or_default();
-        // Programs send no origin, or that of the server itself.
+        // Programs send no origin, or the server's own.
         if headers.contains_key(header::ORIGIN) && !is_same_site(headers, &host) {
             let origin = text(headers, &header::ORIGIN).unwrap_or_default();
             return Err(Refusal::new(

@@ -114,7 +114,6 @@ fn held(command: ToolCommand) -> ToolCommand {
     ToolCommand { motion, ..command }
 }
 
-/// The measured tool pose with the gripper open.
 fn tool_pose(observation: &Observation) -> Action {
     Action::new(observation.robot.ee_position_b, observation.robot.ee_axis_angle_b, 0.0)
 }

@@ -1,9 +1,11 @@
 //! Decoding of action chunks as profiles define them.
 
+use std::fmt;
+
 use rmpv::Value;
 
 use super::{
-    ActionChunk, PolicyError, ToolCommand, ToolMotion,
+    ActionChunk, EncodedAction, PolicyError, ToolCommand, ToolMotion,
     msgpack::{NumberArray, entry, kind, names, numbers},
     profile::{ActionEncoding, PoseEncoding},
 };
@@ -48,115 +50,123 @@ fn is_nothing(error: &Value) -> bool {
 /// # Errors
 /// [`PolicyError::Response`] if the response has another form, [`PolicyError::Action`] if a number is not finite.
 pub fn chunk(response: &Value, encoding: &ActionEncoding) -> Result<ActionChunk, PolicyError> {
+    let refused = |what: fmt::Arguments| PolicyError::Response(what.to_string());
     if response.as_map().is_none() {
         let kind = kind(response);
-        return Err(PolicyError::Response(format!("is {kind}; expected a map with the entry actions")));
+        return Err(refused(format_args!("is {kind}; expected a map with the entry actions")));
     }
     if let Some(error) = entry(response, "error").filter(|error| !is_nothing(error)) {
         let text = error.as_str().map_or_else(|| error.to_string(), str::to_owned);
-        let text: String = text.chars().take(MAX_ERROR_CHARS).collect();
-        return Err(PolicyError::Response(format!("reports an error: {text}")));
+        return Err(refused(format_args!("reports an error: {text:.MAX_ERROR_CHARS$}")));
     }
-    let actions = entry(response, "actions")
-        .or_else(|| entry(response, "action"))
-        .ok_or_else(|| PolicyError::Response(format!("has no entry actions; it has {}", names(response))))?;
+    let actions = entry(response, "actions").or_else(|| entry(response, "action"));
+    let actions =
+        actions.ok_or_else(|| refused(format_args!("has no entry actions; it has {}", names(response))))?;
     let NumberArray { shape, values } = numbers(actions)
-        .map_err(|error| PolicyError::Response(format!("has {error} as actions; expected numbers")))?;
+        .map_err(|error| refused(format_args!("has {error} as actions; expected numbers")))?;
     let own = encoding.numbers();
-    let wrong = |problem: &str| {
-        PolicyError::Response(format!(
+    let wrong = |problem: fmt::Arguments| {
+        Err(refused(format_args!(
             "has actions of shape {shape:?}: {problem}; expected ({own}), (horizon, {own}) or (1, horizon, {own})"
-        ))
+        )))
     };
     let (horizon, width) = match shape[..] {
         [width] => (1, width),
         [horizon, width] | [1, horizon, width] => (horizon, width),
-        _ => return Err(wrong("not rows of actions")),
+        _ => return wrong(format_args!("not rows of actions")),
     };
-    match (horizon, width) {
-        (0, _) => return Err(wrong("no action at all")),
-        (MAX_CHUNK_LEN.., _) => return Err(wrong("too many")),
-        (_, width) if width < own => return Err(wrong("too few numbers per action")),
-        _ => {}
-    }
-    match encoding.length {
-        Some(length) if length != width => {
-            return Err(wrong(&format!("the profile requires {length} numbers per action")));
+    match (horizon, width, encoding.length) {
+        (0, ..) => return wrong(format_args!("no action at all")),
+        (MAX_CHUNK_LEN.., ..) => return wrong(format_args!("too many")),
+        (_, width, _) if width < own => return wrong(format_args!("too few numbers per action")),
+        (_, width, Some(length)) if length != width => {
+            return wrong(format_args!("the profile requires {length} numbers per action"));
         }
         // Eight numbers may be a position, a quaternion and a gripper, or joint positions and a gripper: those that are
         // padding have to be known.
-        None if ![own, PADDED_ACTION_LEN].contains(&width) => {
-            return Err(wrong(&format!(
+        (_, width, None) if ![own, PADDED_ACTION_LEN].contains(&width) => {
+            return wrong(format_args!(
                 "{width} numbers per action are neither {own} nor the {PADDED_ACTION_LEN} of openpi's padding; if the \
                  others are padding, a profile states length = {width}"
-            )));
+            ));
         }
         _ => {}
     }
-    ActionChunk::decode(values.chunks_exact(width).map(|row| row[..own].to_vec()).collect(), encoding)
+    ActionChunk::decode(values.chunks_exact(width).map(|row| &row[..own]), encoding)
 }
 
 impl ActionChunk {
     /// Decodes actions without padding, and keeps their numbers.
     ///
     /// # Errors
-    /// As [`command`].
-    pub fn decode(rows: Vec<Vec<f64>>, encoding: &ActionEncoding) -> Result<Self, PolicyError> {
-        let commands = rows.iter().map(|row| command(row, encoding)).collect::<Result<_, _>>()?;
-        Ok(Self { commands, rows })
+    /// As [`EncodedAction::new`].
+    pub fn decode(
+        rows: impl IntoIterator<Item = impl AsRef<[f64]>>,
+        encoding: &ActionEncoding,
+    ) -> Result<Self, PolicyError> {
+        let encode = |row| EncodedAction::new(AsRef::as_ref(&row), encoding);
+        let encoded: Vec<EncodedAction> = rows.into_iter().map(encode).collect::<Result<_, _>>()?;
+        Ok(Self { commands: encoded.iter().map(|action| action.command(encoding)).collect(), encoded })
     }
 }
 
 /// Excess of a number of a displacement over its range −1..=1 up to which it is clamped without being counted.
 const STEP_OVERSHOOT: f64 = 0.2;
 
+impl EncodedAction {
+    /// # Errors
+    /// [`PolicyError::Action`] if a number is not finite, [`PolicyError::Response`] if there are more or fewer than
+    /// [`ActionEncoding::numbers`].
+    pub fn new(row: &[f64], encoding: &ActionEncoding) -> Result<Self, PolicyError> {
+        if row.iter().any(|number| !number.is_finite()) {
+            return Err(PolicyError::Action(format!("the action {row:?} holds a number that is not finite")));
+        }
+        let (own, count) = (encoding.numbers(), row.len());
+        match row.split_last().filter(|_| count == own) {
+            Some((grip, motion)) => Ok(Self { motion: motion.to_vec(), grip: *grip }),
+            None => Err(PolicyError::Response(format!("has an action of {count} numbers; expected {own}"))),
+        }
+    }
+
+    /// The command; robosuite's controller clips displacements to −1..=1 as well.
+    pub fn command(&self, encoding: &ActionEncoding) -> ToolCommand {
+        ToolCommand { motion: self.motion_within(encoding, 1.0), grip: encoding.gripper.command(self.grip) }
+    }
+
+    /// The motion with displacements beyond −1..=1 in full: a scale that is wrong shows in them.
+    pub fn unclamped_motion(&self, encoding: &ActionEncoding) -> ToolMotion {
+        self.motion_within(encoding, f64::INFINITY)
+    }
+
+    fn motion_within(&self, encoding: &ActionEncoding, limit: f64) -> ToolMotion {
+        let si = |i: usize| match &encoding.units {
+            Some(units) => units.to_si(i, self.motion[i]),
+            None => self.motion[i],
+        };
+        let (linear, angular) = (|| Vec3::from_fn(|i, _| si(i)), || Vec3::from_fn(|i, _| si(3 + i)));
+        let delta = |full, translation_m: f64, rotation_rad: f64| ToolMotion::Delta {
+            full,
+            translation_b: linear().map(|x| x.clamp(-limit, limit)) * translation_m,
+            rotation_b: angular().map(|x| x.clamp(-limit, limit)) * rotation_rad,
+            is_clamped: (0..6).any(|i| si(i).abs() > 1.0 + STEP_OVERSHOOT),
+        };
+        match encoding.pose {
+            PoseEncoding::Joints => ToolMotion::Joints(std::array::from_fn(si)),
+            PoseEncoding::Absolute => ToolMotion::Pose { position_b: linear(), axis_angle_b: angular() },
+            PoseEncoding::Delta { translation_m, rotation_rad } => delta(true, translation_m, rotation_rad),
+            PoseEncoding::DeltaOsc { translation_m, rotation_rad } => {
+                delta(false, translation_m, rotation_rad)
+            }
+        }
+    }
+}
+
 /// Decodes the numbers of an action without padding.
 ///
 /// # Errors
-/// [`PolicyError::Action`] if a number is not finite, [`PolicyError::Response`] if there are more or fewer than
-/// [`ActionEncoding::numbers`].
+/// As [`EncodedAction::new`].
 pub fn command(row: &[f64], encoding: &ActionEncoding) -> Result<ToolCommand, PolicyError> {
-    // robosuite's controller clips to −1..=1 as well.
-    command_within(row, encoding, 1.0)
-}
-
-/// Decodes the numbers of an action as [`command`] does, but with displacements beyond −1..=1 in full: a scale that is
-/// wrong shows in them.
-///
-/// # Errors
-/// As [`command`].
-pub fn unclamped_command(row: &[f64], encoding: &ActionEncoding) -> Result<ToolCommand, PolicyError> {
-    command_within(row, encoding, f64::INFINITY)
-}
-
-/// Decodes the numbers of an action; those of displacements are clamped to `limit`.
-fn command_within(row: &[f64], encoding: &ActionEncoding, limit: f64) -> Result<ToolCommand, PolicyError> {
-    if row.iter().any(|number| !number.is_finite()) {
-        return Err(PolicyError::Action(format!("the action {row:?} holds a number that is not finite")));
-    }
-    let (own, count) = (encoding.numbers(), row.len());
-    let Some((grip, motion)) = row.split_last().filter(|_| count == own) else {
-        return Err(PolicyError::Response(format!("has an action of {count} numbers; expected {own}")));
-    };
-    let si = |i: usize| match &encoding.units {
-        Some(units) => units.to_si(i, motion[i]),
-        None => motion[i],
-    };
-    let grip = encoding.gripper.command(*grip);
-    let (linear, angular) = (|| Vec3::from_fn(|i, _| si(i)), || Vec3::from_fn(|i, _| si(3 + i)));
-    let delta = |full, translation_m: f64, rotation_rad: f64| ToolMotion::Delta {
-        full,
-        translation_b: linear().map(|x| x.clamp(-limit, limit)) * translation_m,
-        rotation_b: angular().map(|x| x.clamp(-limit, limit)) * rotation_rad,
-        is_clamped: (0..6).any(|i| si(i).abs() > 1.0 + STEP_OVERSHOOT),
-    };
-    let motion = match encoding.pose {
-        PoseEncoding::Joints => ToolMotion::Joints(std::array::from_fn(si)),
-        PoseEncoding::Absolute => ToolMotion::Pose { position_b: linear(), axis_angle_b: angular() },
-        PoseEncoding::Delta { translation_m, rotation_rad } => delta(true, translation_m, rotation_rad),
-        PoseEncoding::DeltaOsc { translation_m, rotation_rad } => delta(false, translation_m, rotation_rad),
-    };
-    Ok(ToolCommand { motion, grip })
+    Ok(EncodedAction::new(row, encoding)?.command(encoding))
 }
 
 #[cfg(test)]
@@ -229,8 +239,9 @@ mod tests {
             is_clamped: true,
         };
         assert_eq!(delta, ToolCommand { motion, grip: EncodedGrip::Target(GripTarget::Closure(1.0)) });
-        let full = unclamped_command(&[1.0, -9.0, 0.5, 0.0, 0.0, 2.0, 1.0], &code).unwrap();
-        let ToolMotion::Delta { translation_b, rotation_b, .. } = full.motion else { panic!("{full:?}") };
+        let full = EncodedAction::new(&[1.0, -9.0, 0.5, 0.0, 0.0, 2.0, 1.0], &code).unwrap();
+        let full = full.unclamped_motion(&code);
+        let ToolMotion::Delta { translation_b, rotation_b, .. } = full else { panic!("{full:?}") };
         assert_eq!((translation_b.y, rotation_b.z), (-9.0 * 0.05, 2.0 * 0.5));
     }
 

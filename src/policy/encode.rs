@@ -17,7 +17,6 @@ use softvt_sensing::tactile::MARKER_COUNT;
 pub enum ObservationEntry {
     /// Numbers or an image.
     Array(NpyArray),
-    /// The instruction.
     Text(String),
     /// A seed, or the identity of a request.
     Query(Value),

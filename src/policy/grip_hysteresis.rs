@@ -13,9 +13,9 @@ const FOLLOW_STEPS: u32 = 10;
 /// Hysteresis of a binary gripper, as SoftVTBench's release v0.2 decodes continuous answers.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct GripHysteresis {
-    /// Value from which on, towards that of the closed gripper, an answer closes.
+    /// Value from which on, towards the closed gripper's value, an answer closes.
     pub close: f64,
-    /// Value from which on, towards that of the open gripper, an answer opens.
+    /// Value from which on, towards the open gripper's value, an answer opens.
     pub open: f64,
     /// Control steps for which a change is kept whatever is answered.
     pub hold_steps: u32,
@@ -24,14 +24,12 @@ pub struct GripHysteresis {
 /// State of a gripper with hysteresis: open, or closed at a closure that is held.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct GripLatch {
-    /// Closure while closed.
     held: Option<f64>,
     /// Control steps since the last change.
     steps: u32,
 }
 
 impl Default for GripLatch {
-    /// Open for long.
     fn default() -> Self {
         Self { held: None, steps: u32::MAX }
     }

@@ -21,14 +21,11 @@ use tungstenite::{
     protocol::Role,
 };
 
-use super::transport::{PollingStream, websocket_config, would_block};
+use super::transport::{TimedStream, websocket_config};
 use softvt_common::cancel::CancelFlag;
 
-/// Longest request line with all headers, bytes.
 const MAX_HEAD_BYTES: usize = 16 << 10;
-/// Largest number of headers.
 const MAX_HEADERS: usize = 64;
-/// Longest body, bytes.
 const MAX_BODY_BYTES: usize = 64 << 10;
 /// Time limit for a request, and for the response.
 const REQUEST_TIMEOUT: Duration = Duration::from_secs(10);
@@ -62,12 +59,16 @@ pub fn serve(
     thread::scope(|scope| {
         while !cancel.requested() {
             // Errors are transient: the client has gone, or the process has too many open files.
-            let Ok((stream, _)) = listener.accept() else {
+            let Ok((mut stream, _)) = listener.accept() else {
                 thread::sleep(ACCEPT_INTERVAL);
                 continue;
             };
             let Some(slot) = SlotGuard::acquire(&connections, limit) else {
-                refuse_connection(stream);
+                // Answered without waiting. Unread data would make the system discard the response.
+                if stream.set_nonblocking(true).is_ok() {
+                    let _ = stream.write(OVERLOAD_RESPONSE).and_then(|_| stream.shutdown(Shutdown::Write));
+                    let _ = stream.read(&mut [0; 1024]);
+                }
                 continue;
             };
             let handle = move || {
@@ -100,21 +101,10 @@ impl Drop for SlotGuard<'_> {
     }
 }
 
-/// Answers a connection above the limit without waiting.
-fn refuse_connection(mut stream: TcpStream) {
-    if stream.set_nonblocking(true).is_ok() {
-        let _ = stream.write(OVERLOAD_RESPONSE).and_then(|_| stream.shutdown(Shutdown::Write));
-        // Unread data would make the system discard the response.
-        let _ = stream.read(&mut [0; 1024]);
-    }
-}
-
 /// A request is refused with an HTTP status and a reason.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Refusal {
-    /// The status.
     pub status: StatusCode,
-    /// A line of text.
     pub reason: String,
 }
 
@@ -125,7 +115,6 @@ impl Refusal {
     }
 }
 
-/// A request whose line and headers were read.
 #[derive(Debug)]
 pub struct HttpRequest<'a> {
     /// Method, target and headers.
@@ -133,24 +122,20 @@ pub struct HttpRequest<'a> {
     connection: Connection<'a>,
 }
 
-/// A connection that has to come to an end within a time limit.
 #[derive(Debug)]
 struct Connection<'a> {
-    stream: PollingStream,
+    stream: TimedStream<'a>,
     /// Bytes that were received and not used yet.
     received: Vec<u8>,
-    deadline: Instant,
-    cancel: &'a CancelFlag,
 }
 
 impl<'a> HttpRequest<'a> {
     /// Reads the line and the headers of a request. `None` if the client does not send them; malformed
     /// ones are answered here.
     fn read(stream: TcpStream, cancel: &'a CancelFlag) -> Option<Self> {
-        stream.set_nonblocking(false).ok()?;
-        let stream = PollingStream::new(stream).ok()?;
-        let deadline = Instant::now() + REQUEST_TIMEOUT;
-        let mut connection = Connection { stream, received: Vec::new(), deadline, cancel };
+        let mut stream = TimedStream::new(stream, cancel).ok()?;
+        stream.wait_until(Instant::now() + REQUEST_TIMEOUT);
+        let mut connection = Connection { stream, received: Vec::new() };
         loop {
             match parse_head(&connection.received) {
                 Ok(Some((length, head))) => {
@@ -187,7 +172,7 @@ impl<'a> HttpRequest<'a> {
         };
         let mut receive = || {
             if connection.received.len() < length && headers.contains_key(header::EXPECT) {
-                connection.send(b"HTTP/1.1 100 Continue\r\n\r\n")?;
+                connection.stream.write_all(b"HTTP/1.1 100 Continue\r\n\r\n")?;
             }
             while connection.received.len() < length {
                 connection.receive()?;
@@ -210,15 +195,15 @@ impl<'a> HttpRequest<'a> {
     }
 
     /// Makes the connection a websocket that accepts messages of up to so many bytes. `None` if the client has not
-    /// asked for one, as it is told, or has gone.
-    pub fn upgrade(mut self, max_message_bytes: usize) -> Option<WebSocket<PollingStream>> {
+    /// asked for one, which it receives as an answer, or has gone.
+    pub fn upgrade(mut self, max_message_bytes: usize) -> Option<WebSocket<TimedStream<'a>>> {
         let Ok(response) = create_response(&self.head) else {
             self.respond(StatusCode::BAD_REQUEST, "expected a websocket\n");
             return None;
         };
         let mut bytes = Vec::new();
         write_response(&mut bytes, &response).ok()?;
-        self.connection.send(&bytes).ok()?;
+        self.connection.stream.write_all(&bytes).ok()?;
         let Connection { stream, received, .. } = self.connection;
         let config = websocket_config(max_message_bytes);
         Some(WebSocket::from_partially_read(stream, received, Role::Server, Some(config)))
@@ -226,23 +211,9 @@ impl<'a> HttpRequest<'a> {
 }
 
 impl Connection<'_> {
-    /// Repeats an operation that was interrupted, until the deadline.
-    fn repeat<T>(&mut self, mut operation: impl FnMut(&mut PollingStream) -> io::Result<T>) -> io::Result<T> {
-        loop {
-            match operation(&mut self.stream) {
-                Err(error) if would_block(&error) => {}
-                done => return done,
-            }
-            if self.cancel.requested() || Instant::now() > self.deadline {
-                return Err(ErrorKind::TimedOut.into());
-            }
-        }
-    }
-
-    /// Waits for more bytes.
     fn receive(&mut self) -> io::Result<()> {
         let mut buffer = [0; 4096];
-        match self.repeat(|stream| stream.read(&mut buffer))? {
+        match self.stream.read(&mut buffer)? {
             0 => Err(ErrorKind::UnexpectedEof.into()),
             count => {
                 self.received.extend_from_slice(&buffer[..count]);
@@ -251,38 +222,27 @@ impl Connection<'_> {
         }
     }
 
-    fn send(&mut self, mut bytes: &[u8]) -> io::Result<()> {
-        while !bytes.is_empty() {
-            let count = self.repeat(|stream| stream.write(bytes))?;
-            bytes = &bytes[count..];
-        }
-        Ok(())
-    }
-
     /// Sends a response and closes the connection, once the client has received it.
     fn respond(&mut self, status: StatusCode, headers: &[(&str, &str)], body: &[u8]) {
-        self.deadline = Instant::now() + REQUEST_TIMEOUT;
+        self.stream.wait_until(Instant::now() + REQUEST_TIMEOUT);
         let mut head =
             format!("HTTP/1.1 {status}\r\nContent-Length: {}\r\nConnection: close\r\n", body.len());
         for (name, value) in headers {
             let _ = write!(head, "{name}: {value}\r\n");
         }
         head.push_str("\r\n");
-        let sent = self.send(head.as_bytes()).and_then(|()| self.send(body));
+        let sent = self.stream.write_all(head.as_bytes()).and_then(|()| self.stream.write_all(body));
         if sent.and_then(|()| self.stream.end_output()).is_err() {
             return;
         }
         // The system would discard the response if data remained unread.
-        self.deadline = Instant::now() + DRAIN_TIMEOUT;
+        self.stream.wait_until(Instant::now() + DRAIN_TIMEOUT);
         let mut discarded = [0; 4096];
-        while matches!(self.repeat(|stream| stream.read(&mut discarded)), Ok(1..)) {}
+        while matches!(self.stream.read(&mut discarded), Ok(1..)) {}
     }
 }
 
 /// The head of a request and its length. `None` if it is not complete.
-///
-/// # Errors
-/// It is malformed or too long.
 fn parse_head(received: &[u8]) -> Result<Option<(usize, Request)>, Refusal> {
     let mut headers = [httparse::EMPTY_HEADER; MAX_HEADERS];
     let mut parsed = httparse::Request::new(&mut headers);

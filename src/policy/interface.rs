@@ -14,7 +14,7 @@ pub struct Action {
     pub position_b: Vec3,
     /// Absolute tool orientation in the base frame as axis-angle, rad.
     pub axis_angle_b: Vec3,
-    /// Arm joint positions (rad) that are commanded directly; the pose is that of the tool there. `None` for a pose
+    /// Arm joint positions (rad) that are commanded directly; the pose is the tool's there. `None` for a pose
     /// that inverse kinematics turns into joint positions.
     pub joints: Option<ArmAngles>,
     /// Target of the gripper. The hand clamps closures outside of 0..=1, which the record counts; a grip force is at
@@ -25,12 +25,10 @@ pub struct Action {
 }
 
 impl Action {
-    /// An action that commands a closure.
     pub fn new(position_b: Vec3, axis_angle_b: Vec3, closure: f64) -> Self {
         Self::of_pose(position_b, axis_angle_b, GripTarget::Closure(closure))
     }
 
-    /// An action that commands a tool pose.
     pub fn of_pose(position_b: Vec3, axis_angle_b: Vec3, grip: GripTarget) -> Self {
         Self { position_b, axis_angle_b, joints: None, grip, is_clamped: false }
     }
@@ -58,12 +56,11 @@ impl Action {
         }
     }
 
-    /// Tool pose in the base frame.
     pub fn pose_b(&self) -> Pose {
         Pose::from_parts(self.position_b.into(), rotation::from_axis_angle(&self.axis_angle_b))
     }
 
-    /// All numbers of the action: those of [`Self::to_array`], and the grip force and the joint positions
+    /// All numbers of the action: [`Self::to_array`], and the grip force and the joint positions
     /// if it commands them.
     pub fn numbers(self) -> impl Iterator<Item = f64> {
         self.to_array().into_iter().chain(self.force_n()).chain(self.joints.into_iter().flatten())
@@ -85,23 +82,18 @@ impl Action {
 /// control step in which it is executed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ToolCommand {
-    /// Motion of the tool.
     pub motion: ToolMotion,
-    /// Command of the gripper.
     pub grip: EncodedGrip,
 }
 
-/// Motion of the tool in a [`ToolCommand`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum ToolMotion {
-    /// A pose in the robot's base frame.
     Pose {
         /// Position in the base frame, m.
         position_b: Vec3,
         /// Orientation in the base frame as axis-angle, rad.
         axis_angle_b: Vec3,
     },
-    /// Arm joint positions, rad.
     Joints(ArmAngles),
     /// A displacement from the measured tool pose.
     Delta {
@@ -120,7 +112,6 @@ pub enum ToolMotion {
 /// Command of the gripper in a [`ToolCommand`], as the grip code of a profile reads it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum EncodedGrip {
-    /// A target of the hand.
     Target(GripTarget),
     /// The closure of an answer in the code two-width, see [`GripLatch`](super::GripLatch).
     TwoWidth(f64),
@@ -146,13 +137,21 @@ impl From<Action> for ToolCommand {
 pub struct ActionChunk {
     /// At least one command, in order of execution.
     pub commands: Vec<ToolCommand>,
-    /// The numbers that each command was decoded from, without padding; empty if it was not.
-    pub rows: Vec<Vec<f64>>,
+    /// The numbers that each command was decoded from; empty if it was not.
+    pub encoded: Vec<EncodedAction>,
+}
+
+/// The numbers of an action in the encoding of a profile, without padding.
+#[derive(Clone, Debug, PartialEq)]
+pub struct EncodedAction {
+    /// Pose, displacement or joint positions of the arm.
+    pub motion: Vec<f64>,
+    pub grip: f64,
 }
 
 impl From<Vec<ToolCommand>> for ActionChunk {
     fn from(commands: Vec<ToolCommand>) -> Self {
-        Self { commands, rows: Vec::new() }
+        Self { commands, encoded: Vec::new() }
     }
 }
 
@@ -166,13 +165,9 @@ impl From<Action> for ActionChunk {
 /// must not influence a policy, and its instruction.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct EpisodeBrief {
-    /// Name of the suite.
     pub suite: String,
-    /// Index of the task in the suite.
     pub task: usize,
-    /// The instruction.
     pub prompt: String,
-    /// Index of the episode in its split.
     pub episode: u32,
     /// Seed of the run. It may influence the random numbers of a policy alone.
     pub seed: u64,
@@ -223,7 +218,6 @@ fn seed_of(kind: &str, parts: &[String]) -> u32 {
 }
 
 impl EpisodeBrief {
-    /// Position of the episode in its run.
     pub fn index(&self) -> EpisodeIndex {
         EpisodeIndex { task: self.task, episode: self.episode }
     }
@@ -235,7 +229,6 @@ pub enum PolicyError {
     /// The connection to the server failed, or the server does not respond as its protocol requires.
     #[error("the policy server {url} {problem}")]
     Server {
-        /// Address of the server.
         url: String,
         /// The problem, after the subject "the policy server".
         problem: String,
@@ -244,41 +237,23 @@ pub enum PolicyError {
     #[error(
         "no policy server at {url}: {reason}; tried for {seconds} s: start it, or allow it more time (--policy-timeout)"
     )]
-    Unreachable {
-        /// Address of the server.
-        url: String,
-        /// Failure of the last attempt.
-        reason: String,
-        /// The time limit, s.
-        seconds: String,
-    },
+    Unreachable { url: String, reason: String, seconds: String },
     /// Something other than a websocket server listens at the address.
     #[error("{url} is not a websocket server: {reason}")]
-    NotWebsocket {
-        /// Address of the server.
-        url: String,
-        /// Failure of the handshake.
-        reason: String,
-    },
+    NotWebsocket { url: String, reason: String },
     /// The address of the server is invalid: an error in the user's input.
     #[error("the policy server {url:?}: {problem}; expected ws://HOST:PORT")]
-    Address {
-        /// Address as it was given.
-        url: String,
-        /// Reason why it is not valid.
-        problem: String,
-    },
+    Address { url: String, problem: String },
     /// The response does not have the form that the profile defines. The text continues "the policy's reply".
     #[error("the policy's reply {0}")]
     Response(String),
-    /// A response of the right form holds an action that cannot be executed; the text becomes that of the outcome. The
+    /// A response of the right form holds an action that cannot be executed; its text becomes the outcome's. The
     /// episode fails; the run continues.
     #[error("{0}")]
     Action(String),
     /// The script of a Lua policy or of an expert failed: an error in the user's input, with the message of the script.
     #[error("{0}")]
     Script(String),
-    /// The run was cancelled.
     #[error("interrupted")]
     Interrupted,
 }
@@ -324,9 +299,6 @@ pub trait Policy: Send {
         SensorStreams::default()
     }
     /// Prepares for an episode.
-    ///
-    /// # Errors
-    /// See [`PolicyError`].
     fn reset(&mut self, _brief: &EpisodeBrief) -> Result<(), PolicyError> {
         Ok(())
     }
@@ -335,16 +307,10 @@ pub trait Policy: Send {
         false
     }
     /// Receives the observation of a control step in which no commands are needed.
-    ///
-    /// # Errors
-    /// See [`PolicyError`].
     fn observe(&mut self, _observation: &Observation) -> Result<(), PolicyError> {
         Ok(())
     }
     /// Commands of the next control steps.
-    ///
-    /// # Errors
-    /// See [`PolicyError`].
     fn act(&mut self, observation: &Observation) -> Result<ActionChunk, PolicyError>;
     /// Ends the episode. The result of the episode is not disclosed.
     ///
@@ -362,14 +328,8 @@ mod tests {
     #[test]
     fn seeds_are_those_of_the_released_key() {
         // Computed with Python's hashlib from the description of the release.
-        let brief = EpisodeBrief {
-            suite: "object_soft".into(),
-            task: 3,
-            prompt: String::new(),
-            episode: 80,
-            seed: 11,
-            alias: None,
-        };
+        let suite = "object_soft".to_owned();
+        let brief = EpisodeBrief { suite, task: 3, episode: 80, seed: 11, ..EpisodeBrief::default() };
         let first = QueryId::first(&brief);
         let second = QueryId { query: 1, step: 10, ..first.clone() };
         assert_eq!((first.seed(), second.seed()), (1_728_023_119, 3_567_768_914));

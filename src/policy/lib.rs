@@ -1,5 +1,5 @@
 //! Policies: their interface, their observations, the encodings of observations and actions, and policy servers.
-#![warn(missing_docs, unreachable_pub)]
+#![warn(unreachable_pub)]
 
 pub mod access;
 pub mod builtin;
@@ -20,7 +20,8 @@ pub mod transport;
 pub use command_resolver::CommandResolver;
 pub use grip_hysteresis::{GripHysteresis, GripLatch};
 pub use interface::{
-    Action, ActionChunk, EncodedGrip, EpisodeBrief, Policy, PolicyError, QueryId, ToolCommand, ToolMotion,
+    Action, ActionChunk, EncodedAction, EncodedGrip, EpisodeBrief, Policy, PolicyError, QueryId, ToolCommand,
+    ToolMotion,
 };
 pub use observation::{
     CameraImage, Observation, PadForce, PastStep, SensorStreams, TactileFrame, TactileHistory,

@@ -32,7 +32,6 @@ pub fn entry<'a>(map: &'a Value, name: &str) -> Option<&'a Value> {
     map.as_map()?.iter().find(|(key, _)| is(key)).map(|(_, value)| value)
 }
 
-/// Names of a map's entries, for error messages.
 pub fn names(map: &Value) -> String {
     let name = |key: &Value| match key {
         Value::String(text) => text.as_str().map(str::to_owned),
@@ -59,51 +58,11 @@ pub fn kind(value: &Value) -> &'static str {
 
 /// Deepest nesting that is read.
 const MAX_DEPTH: usize = 64;
-/// Maximum number of values in a message, and of elements in an array. A decoded value takes 40 bytes, an encoded one
-/// can take a single byte. The longest valid messages, states of 50,000 actions, have 350,000 numbers.
+/// Largest number of values of a message, and of elements of an array. A value takes one byte in a message, and 40 in
+/// memory.
 const MAX_VALUES: usize = 1 << 20;
+const TRUNCATED: &str = "not msgpack: the end is missing";
 
-/// A message is not one msgpack value. The text completes "the message is …".
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[allow(missing_docs)]
-pub enum MsgpackError {
-    #[error("more than one msgpack value: {0} bytes follow the first")]
-    TrailingBytes(usize),
-    #[error("not msgpack: nested more than {MAX_DEPTH} times")]
-    TooDeep,
-    #[error("not msgpack: the end is missing")]
-    Truncated,
-    #[error("too long: more than {MAX_VALUES} values")]
-    TooManyValues,
-    #[error("ambiguous: a map has the key {0:?} twice")]
-    DuplicateKey(String),
-}
-
-/// A value is not an array of numbers. The text says what it is instead.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[allow(missing_docs)]
-pub enum ArrayError {
-    #[error("{0}")]
-    NotAnArray(&'static str),
-    #[error("a numpy scalar that is not a number")]
-    Scalar,
-    #[error("a list with more than {MAX_AXES} axes")]
-    TooManyAxes,
-    #[error("a list whose rows differ in length")]
-    Ragged,
-    #[error("an array without {0}")]
-    Missing(&'static str),
-    #[error("an array whose shape is not made of whole numbers")]
-    Shape,
-    #[error("an array of dtype {0:?}")]
-    Dtype(String),
-    #[error("an array with more than {MAX_VALUES} elements")]
-    TooManyElements,
-    #[error("an array of shape {shape:?} and dtype {dtype:?} with {bytes} bytes")]
-    Size { shape: Vec<usize>, dtype: String, bytes: usize },
-}
-
-/// An array of numbers that was received.
 #[derive(Clone, Debug, PartialEq)]
 pub struct NumberArray {
     /// Lengths of the axes; empty for a scalar.
@@ -112,12 +71,10 @@ pub struct NumberArray {
     pub values: Vec<f64>,
 }
 
-/// A map with its entries in order.
 pub fn map<K: Into<Value>>(entries: impl IntoIterator<Item = (K, Value)>) -> Value {
     Value::Map(entries.into_iter().map(|(key, value)| (key.into(), value)).collect())
 }
 
-/// Encodes a value as msgpack.
 pub fn pack(value: &Value) -> Vec<u8> {
     let mut bytes = Vec::new();
     // Writing to a vector does not fail.
@@ -125,21 +82,22 @@ pub fn pack(value: &Value) -> Vec<u8> {
     bytes
 }
 
-/// Decodes a message, which must be exactly one value. The values are counted before memory is allocated for them.
+/// Decodes a message, which must be exactly one value, in whose maps no key is given twice. The values are counted
+/// before memory is allocated for them. The text of an error completes "the message is …".
 ///
 /// # Errors
 /// The bytes are not one valid value, hold too many values, or a map in them has a key twice.
-pub fn unpack(mut bytes: &[u8]) -> Result<Value, MsgpackError> {
+pub fn unpack(mut bytes: &[u8]) -> Result<Value, String> {
     use rmpv::decode::{Error, read_value_with_max_depth};
     count_values(bytes)?;
     match read_value_with_max_depth(&mut bytes, MAX_DEPTH) {
         Ok(value) if bytes.is_empty() => match duplicate_key(&value) {
-            Some(key) => Err(MsgpackError::DuplicateKey(key)),
+            Some(key) => Err(format!("ambiguous: a map has the key {key:?} twice")),
             None => Ok(value),
         },
-        Ok(_) => Err(MsgpackError::TrailingBytes(bytes.len())),
-        Err(Error::DepthLimitExceeded) => Err(MsgpackError::TooDeep),
-        Err(Error::InvalidMarkerRead(_) | Error::InvalidDataRead(_)) => Err(MsgpackError::Truncated),
+        Ok(_) => Err(format!("more than one msgpack value: {} bytes follow the first", bytes.len())),
+        Err(Error::DepthLimitExceeded) => Err(format!("not msgpack: nested more than {MAX_DEPTH} times")),
+        Err(Error::InvalidMarkerRead(_) | Error::InvalidDataRead(_)) => Err(TRUNCATED.to_owned()),
     }
 }
 
@@ -166,21 +124,19 @@ fn duplicate_key(value: &Value) -> Option<String> {
 }
 
 /// Counts the values of the first value in `bytes`, its own and those that it contains.
-///
-/// # Errors
-/// The value is cut off, or has more than [`MAX_VALUES`].
-fn count_values(mut bytes: &[u8]) -> Result<usize, MsgpackError> {
+/// Refuses a value that is cut off, or has more than [`MAX_VALUES`].
+fn count_values(mut bytes: &[u8]) -> Result<usize, String> {
     let (mut counted, mut pending) = (0, 1);
     while pending > 0 {
-        let header = ValueHeader::read(&mut bytes).ok_or(MsgpackError::Truncated)?;
-        bytes = bytes.get(header.data_bytes..).ok_or(MsgpackError::Truncated)?;
+        let header = ValueHeader::read(&mut bytes).ok_or(TRUNCATED)?;
+        bytes = bytes.get(header.data_bytes..).ok_or(TRUNCATED)?;
         (counted, pending) = (counted + 1, pending - 1 + header.children);
         // Every value takes at least one byte, so that a false length is found before its values are counted.
         if pending > bytes.len() {
-            return Err(MsgpackError::Truncated);
+            return Err(TRUNCATED.to_owned());
         }
         if counted + pending > MAX_VALUES {
-            return Err(MsgpackError::TooManyValues);
+            return Err(format!("too long: more than {MAX_VALUES} values"));
         }
     }
     Ok(counted)
@@ -232,16 +188,18 @@ impl ValueHeader {
     }
 }
 
-/// Reads a numpy array, a numpy scalar, a number or nested lists of numbers.
+/// Reads a numpy array, a numpy scalar, a number or nested lists of numbers. The text of an error describes another
+/// value that was found in its place.
 ///
 /// # Errors
 /// The value is something else, or its shape and data disagree.
-pub fn numbers(value: &Value) -> Result<NumberArray, ArrayError> {
+pub fn numbers(value: &Value) -> Result<NumberArray, String> {
     if entry(value, "__ndarray__").is_some() {
         return ndarray(value);
     }
     if entry(value, "__npgeneric__").is_some() {
-        let number = entry(value, "data").and_then(Value::as_f64).ok_or(ArrayError::Scalar)?;
+        let number = entry(value, "data").and_then(Value::as_f64);
+        let number = number.ok_or("a numpy scalar that is not a number")?;
         return Ok(NumberArray { shape: Vec::new(), values: vec![number] });
     }
     let mut values = Vec::new();
@@ -252,39 +210,42 @@ pub fn numbers(value: &Value) -> Result<NumberArray, ArrayError> {
 /// Largest number of axes of nested lists.
 const MAX_AXES: usize = 4;
 
-fn nested(value: &Value, values: &mut Vec<f64>, depth: usize) -> Result<Vec<usize>, ArrayError> {
+fn nested(value: &Value, values: &mut Vec<f64>, depth: usize) -> Result<Vec<usize>, String> {
     if let Some(number) = value.as_f64() {
         values.push(number);
         return Ok(Vec::new());
     }
-    let Some(items) = value.as_array() else { return Err(ArrayError::NotAnArray(kind(value))) };
+    let items = value.as_array().ok_or(kind(value))?;
     if depth == MAX_AXES {
-        return Err(ArrayError::TooManyAxes);
+        return Err(format!("a list with more than {MAX_AXES} axes"));
     }
     let mut inner: Option<Vec<usize>> = None;
     for item in items {
         let shape = nested(item, values, depth + 1)?;
         if inner.as_ref().is_some_and(|known| *known != shape) {
-            return Err(ArrayError::Ragged);
+            return Err("a list whose rows differ in length".to_owned());
         }
         inner = Some(shape);
     }
     Ok(std::iter::once(items.len()).chain(inner.unwrap_or_default()).collect())
 }
 
-fn ndarray(value: &Value) -> Result<NumberArray, ArrayError> {
-    let dtype = entry(value, "dtype").and_then(Value::as_str).ok_or(ArrayError::Missing("dtype"))?;
-    let data = entry(value, "data").and_then(Value::as_slice).ok_or(ArrayError::Missing("data"))?;
-    let shape = entry(value, "shape").and_then(Value::as_array).ok_or(ArrayError::Missing("shape"))?;
-    let shape: Option<Vec<usize>> = shape.iter().map(|n| n.as_u64()?.try_into().ok()).collect();
-    let shape = shape.ok_or(ArrayError::Shape)?;
-    let size = element_size(dtype).ok_or_else(|| ArrayError::Dtype(dtype.to_owned()))?;
-    let count = shape.iter().try_fold(1_usize, |all, n| all.checked_mul(*n));
-    if count.and_then(|count| count.checked_mul(size)) != Some(data.len()) {
-        return Err(ArrayError::Size { shape, dtype: dtype.to_owned(), bytes: data.len() });
+fn ndarray(value: &Value) -> Result<NumberArray, String> {
+    let field = |name| entry(value, name).ok_or_else(|| format!("an array without {name}"));
+    let (dtype, data, shape) =
+        (field("dtype")?.as_str(), field("data")?.as_slice(), field("shape")?.as_array());
+    let shape: Option<Vec<usize>> =
+        shape.and_then(|shape| shape.iter().map(|n| n.as_u64()?.try_into().ok()).collect());
+    let (Some(dtype), Some(data), Some(shape)) = (dtype, data, shape) else {
+        return Err("an array whose dtype is not text, data not bytes, or shape not whole numbers".to_owned());
+    };
+    let size = element_size(dtype).ok_or_else(|| format!("an array of dtype {dtype:?}"))?;
+    if shape.iter().try_fold(size, |all, n| all.checked_mul(*n)) != Some(data.len()) {
+        let bytes = data.len();
+        return Err(format!("an array of shape {shape:?} and dtype {dtype:?} with {bytes} bytes"));
     }
-    if count.is_some_and(|count| count > MAX_VALUES) {
-        return Err(ArrayError::TooManyElements);
+    if data.len() / size > MAX_VALUES {
+        return Err(format!("an array with more than {MAX_VALUES} elements"));
     }
     let array = NpyArray { dtype: dtype.to_owned(), shape, data: data.to_vec() };
     let values = array.values();
@@ -329,9 +290,23 @@ mod tests {
         assert_eq!(of("|i1", &[0xFF]), Ok(-1.0));
         assert_eq!(of("|u1", &[0xFF]), Ok(255.0));
         assert_eq!(of("<i8", &(-9_i64).to_le_bytes()), Ok(-9.0));
-        assert!(of("<c8", &[0; 8]).is_err_and(|e| e.to_string().contains("dtype \"<c8\"")));
-        assert!(of("<f4", &[0; 5]).is_err_and(|e| e.to_string().contains("5 bytes")));
+        assert!(of("<c8", &[0; 8]).is_err_and(|error| error.contains("dtype \"<c8\"")));
+        assert!(of("<f4", &[0; 5]).is_err_and(|error| error.contains("5 bytes")));
         assert!(of("é", &[0; 5]).is_err());
+    }
+
+    #[test]
+    fn a_message_is_one_whole_value() {
+        let value =
+            Value::Array(vec![map([("a", Value::from(-3))]), Value::Binary(vec![0xDD; 300]), Value::Nil]);
+        let bytes = pack(&value);
+        assert_eq!(unpack(&bytes), Ok(value));
+        for cut in [1, 7, bytes.len() - 1] {
+            assert!(unpack(&bytes[..cut]).is_err_and(|error| error.ends_with("the end is missing")));
+        }
+        assert!(unpack(&[&bytes[..], &[0]].concat()).is_err_and(|error| error.contains("1 bytes follow")));
+        let deep = [&[0x91; 5000][..], &[0xC0]].concat();
+        assert!(unpack(&deep).is_err_and(|error| error.contains("nested more than 64 times")));
     }
 
     #[test]
@@ -351,34 +326,18 @@ mod tests {
         let bytes = pack(&nested);
         assert_eq!(count_values(&bytes), Ok(1 + 7 + 21 + 7 + 70_001));
         assert_eq!(unpack(&bytes), Ok(nested));
-        for cut in [1, 7, 400, bytes.len() - 1] {
-            assert_eq!(unpack(&bytes[..cut]), Err(MsgpackError::Truncated));
-        }
     }
 
     #[test]
     fn a_message_of_many_small_values_is_refused_before_it_is_decoded() {
-        let count: u32 = 63 << 20;
+        let count: u32 = 4 << 20;
         let mut bytes = vec![0xDD];
         bytes.extend(count.to_be_bytes());
         bytes.resize(bytes.len() + count as usize, 0xC0);
-        assert_eq!(unpack(&bytes), Err(MsgpackError::TooManyValues));
+        assert!(unpack(&bytes).is_err_and(|error| error.contains("more than 1048576 values")));
         let array = NpyArray { dtype: "|u1".to_owned(), shape: vec![2 << 20], data: vec![0; 2 << 20] };
-        assert_eq!(numbers(&pack_array(array, true)), Err(ArrayError::TooManyElements));
-    }
-
-    #[test]
-    fn values_that_are_not_arrays_are_described() {
-        let ragged = Value::Array(vec![Value::Array(vec![1.into()]), Value::Array(vec![])]);
-        assert!(numbers(&ragged).is_err_and(|e| e.to_string().contains("differ in length")));
-        assert_eq!(numbers(&"hello".into()), Err(ArrayError::NotAnArray("text")));
-        let huge = Value::Map(vec![
-            ("__ndarray__".into(), true.into()),
-            ("data".into(), Value::Binary(vec![0; 8])),
-            ("dtype".into(), "<f4".into()),
-            ("shape".into(), Value::Array(vec![u64::MAX.into(), 2.into()])),
-        ]);
-        assert!(numbers(&huge).is_err());
+        let refused = numbers(&pack_array(array, true));
+        assert!(refused.is_err_and(|error| error.contains("more than 1048576 elements")));
     }
 
     #[test]
@@ -388,8 +347,22 @@ mod tests {
             unpack(&pack(&map([("request", Value::Array(vec![inner]))])))
         };
         assert!(message(["type".into(), "task".into()]).is_ok());
-        let twice = MsgpackError::DuplicateKey("type".to_owned());
-        assert_eq!(message(["type".into(), "type".into()]), Err(twice.clone()));
-        assert_eq!(message(["type".into(), Value::Binary(b"type".to_vec())]), Err(twice));
+        for twice in ["type".into(), Value::Binary(b"type".to_vec())] {
+            assert!(message(["type".into(), twice]).is_err_and(|error| error.contains("\"type\" twice")));
+        }
+    }
+
+    #[test]
+    fn values_that_are_not_arrays_are_described() {
+        let ragged = Value::Array(vec![Value::Array(vec![1.into()]), Value::Array(vec![])]);
+        assert!(numbers(&ragged).is_err_and(|error| error.contains("differ in length")));
+        assert_eq!(numbers(&"hello".into()), Err("text".to_owned()));
+        let huge = Value::Map(vec![
+            ("__ndarray__".into(), true.into()),
+            ("data".into(), Value::Binary(vec![0; 8])),
+            ("dtype".into(), "<f4".into()),
+            ("shape".into(), Value::Array(vec![u64::MAX.into(), 2.into()])),
+        ]);
+        assert!(numbers(&huge).is_err());
     }
 }

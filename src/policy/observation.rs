@@ -35,13 +35,11 @@ pub struct SensorStreams {
 ///
 /// Proprioception and the prompt are always present; images, touch and forces if [`SensorStreams`] requests them.
 /// Poses are in the robot base frame. All streams show the same instant, 20 times per second of simulated time.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Observation {
     /// Time since the start of the episode, s.
     pub time_s: f64,
-    /// Proprioception.
     pub robot: RobotState,
-    /// The instruction.
     pub prompt: String,
     /// Images of the requested cameras, in the order of [`SensorStreams::cameras`].
     pub cameras: Vec<Arc<CameraImage>>,
@@ -57,10 +55,8 @@ pub struct Observation {
     pub force_history: Vec<[f64; 6]>,
 }
 
-/// An earlier control step of an observation.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PastStep {
-    /// Proprioception.
     pub robot: RobotState,
     /// Images of the requested cameras; empty if only the state of this step was requested.
     pub cameras: Vec<Arc<CameraImage>>,
@@ -70,7 +66,6 @@ pub struct PastStep {
 /// the scene behind that object's surface; results count such steps as `camera_inside`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CameraImage {
-    /// Name of the camera.
     pub name: String,
     /// The image in the camera's size, by default 224 × 224.
     pub image: RgbImage,
@@ -139,7 +134,6 @@ impl TactileFrame {
         Self { cell: mosaic_cell(&image), image, untouched, markers }
     }
 
-    /// The image with the markers drawn into it.
     pub fn with_markers(&self, style: MarkerStyle) -> RgbImage {
         let mut image = self.image.clone();
         self.markers.draw(&mut image, style);
@@ -157,7 +151,6 @@ impl TactileFrame {
 }
 
 impl TactileHistory {
-    /// Current frames of the left and right finger.
     pub fn now(&self) -> Option<&[TactileFrame; 2]> {
         self.frames.last().map(AsRef::as_ref)
     }

@@ -13,11 +13,9 @@ use softvt_sensing::tactile::{HISTORY_LENGTH, MarkerStyle, TactileMosaicLayout};
 /// [`encode`](super::encode) builds the observation of a profile, [`decode`](super::decode) reads its actions.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Profile {
-    /// Name, as in results.
     pub name: String,
     /// Entries of an observation, in order.
     pub inputs: Vec<ProfileInput>,
-    /// Encoding of the actions.
     pub actions: ActionEncoding,
     /// True to send an observation in every control step, also in those in which no action is needed.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
@@ -27,12 +25,10 @@ pub struct Profile {
 /// Maximum number of control steps of an input.
 pub const MAX_FRAMES: usize = 32;
 
-/// One entry of an observation.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ProfileInput {
     /// Keys under which it is sent.
     pub keys: Vec<String>,
-    /// Content of the entry.
     pub source: ObservationSource,
     /// Number of control steps in the entry, the present one last, along its first axis. `None`: the present step
     /// alone without that axis, or all 8 steps of markers and forces.
@@ -41,12 +37,10 @@ pub struct ProfileInput {
 }
 
 impl ProfileInput {
-    /// An input of the present step.
     pub fn new(keys: Vec<String>, source: ObservationSource) -> Self {
         Self { keys, source, frames: None }
     }
 
-    /// Number of control steps that it needs.
     pub fn steps(&self) -> usize {
         let default = match self.source {
             ObservationSource::MarkerMotion | ObservationSource::Force => HISTORY_LENGTH,
@@ -55,7 +49,6 @@ impl ProfileInput {
         self.frames.unwrap_or(default)
     }
 
-    /// The shortest of its keys.
     pub fn shortest_key(&self) -> &str {
         self.keys.iter().min_by_key(|key| key.len()).map_or("", String::as_str)
     }
@@ -67,26 +60,15 @@ impl ProfileInput {
 pub enum ObservationSource {
     /// A camera image, uint8 (height, width, 3).
     Camera {
-        /// Name of the camera.
         camera: String,
         /// True to rotate the image by 180°, as in LIBERO's data.
         half_turn: bool,
     },
     /// Depth of a camera image along the optical axis, m, float32 (height, width); infinite in the background.
-    Depth {
-        /// Name of the camera.
-        camera: String,
-        /// True to rotate the image by 180°.
-        half_turn: bool,
-    },
+    Depth { camera: String, half_turn: bool },
     /// Object at each pixel of a camera image, uint16 (height, width): its number in the scene, from 1; 0 in the
     /// background, [`ROBOT_SEGMENTATION_ID`](softvt_scene::ROBOT_SEGMENTATION_ID) for the robot.
-    Segmentation {
-        /// Name of the camera.
-        camera: String,
-        /// True to rotate the image by 180°.
-        half_turn: bool,
-    },
+    Segmentation { camera: String, half_turn: bool },
     /// State of the robot, float32 (n).
     State {
         /// Parts of the vector, in order.
@@ -96,7 +78,6 @@ pub enum ObservationSource {
     Prompt,
     /// The 4 × 4 mosaic of the last 8 tactile images of both fingers, uint8 (224, 224, 3).
     TactileImage {
-        /// Assignment of cells to fingers.
         layout: TactileMosaicLayout,
         /// Style in which the markers are drawn into the images; `None` for images without markers.
         #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -104,7 +85,6 @@ pub enum ObservationSource {
     },
     /// The last tactile image of one finger, uint8 (240, 320, 3).
     Tactile {
-        /// Finger whose sensor is read.
         finger: Side,
         /// Style in which the markers are drawn into the image; `None` for an image without markers.
         #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -125,9 +105,8 @@ pub enum ObservationSource {
 /// Encoding of an action: numbers for the motion of the arm and one for the gripper. Further numbers are padding.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ActionEncoding {
-    /// Meaning of the numbers before that of the gripper.
+    /// Meaning of the numbers before the gripper's.
     pub pose: PoseEncoding,
-    /// Meaning of the number of the gripper.
     pub gripper: GripperValues,
     /// Conversion of the first numbers to the units of `pose`, if they differ.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -138,22 +117,19 @@ pub struct ActionEncoding {
     pub length: Option<usize>,
 }
 
-/// Affine conversion `scale · number + offset` of the numbers of an action before that of the gripper.
+/// Affine conversion `scale · number + offset` of the numbers of an action before the gripper's.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ActionUnits {
-    /// Factors.
     pub scale: Vec<f64>,
     /// Offsets, m and rad.
     pub offset: Vec<f64>,
 }
 
 impl ActionUnits {
-    /// A number of an action in SI units.
     pub fn to_si(&self, index: usize, number: f64) -> f64 {
         self.factor(index) * number + self.origin(index)
     }
 
-    /// A number of an action for a value in SI units.
     pub fn from_si(&self, index: usize, value: f64) -> f64 {
         (value - self.origin(index)) / self.factor(index)
     }
@@ -174,7 +150,7 @@ impl ActionEncoding {
         Self { pose, gripper, units: None, length: None }
     }
 
-    /// Numbers of an action without padding: those of the motion, and one of the gripper.
+    /// Numbers of an action without padding: the motion's, and one of the gripper.
     pub fn numbers(&self) -> usize {
         self.pose.numbers() + 1
     }
@@ -193,7 +169,7 @@ impl ActionEncoding {
 /// Names of the numbers of an action that give a pose or a displacement.
 pub const POSE_NAMES: [&str; 6] = ["x", "y", "z", "axis_angle_x", "axis_angle_y", "axis_angle_z"];
 
-/// Meaning of the numbers of an action before that of the gripper.
+/// Meaning of the numbers of an action before the gripper's.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case", tag = "kind")]
 pub enum PoseEncoding {
@@ -222,7 +198,6 @@ impl PoseEncoding {
     /// All names, in the order of the documentation.
     pub const NAMES: [&str; 4] = ["absolute", "delta", "delta_osc", "joints"];
 
-    /// How many numbers it has.
     pub fn numbers(self) -> usize {
         match self {
             Self::Joints => JOINT_NAMES.len(),
@@ -264,7 +239,6 @@ impl GripCode {
     /// All codes, in the order of the documentation.
     pub const ALL: [Self; 4] = [Self::Continuous, Self::Binary, Self::TwoWidth, Self::Force];
 
-    /// Name in flags and files.
     pub fn name(self) -> &'static str {
         match self {
             Self::Continuous => "continuous",
@@ -274,7 +248,6 @@ impl GripCode {
         }
     }
 
-    /// The code of a name.
     pub fn named(name: &str) -> Option<Self> {
         Self::ALL.into_iter().find(|code| code.name() == name)
     }
@@ -288,7 +261,6 @@ pub struct GripperValues {
     pub open: f64,
     /// Value of the closed gripper. For [`GripCode::Force`] values are forces, N.
     pub closed: f64,
-    /// Meaning of the value.
     pub code: GripCode,
     /// For [`GripCode::Binary`]: hysteresis, instead of the middle between both values.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -309,7 +281,6 @@ impl GripperValues {
         Self { open, closed, code: GripCode::Continuous, latch: None }
     }
 
-    /// The command of a value.
     pub fn command(&self, value: f64) -> EncodedGrip {
         if let (GripCode::Binary, Some(GripHysteresis { close, open, hold_steps })) = (self.code, self.latch)
         {
@@ -359,7 +330,6 @@ impl GripperValues {
     }
 }
 
-/// Built-in profiles and their descriptions.
 pub const PROFILES: [(&str, &str); 9] = [
     ("vision", "both cameras, state, prompt; absolute pose; gripper open or closed (binary)"),
     (
@@ -379,7 +349,6 @@ pub const PROFILES: [(&str, &str); 9] = [
 ];
 
 impl Profile {
-    /// The built-in profile of a name.
     pub fn named(name: &str) -> Option<Self> {
         let both = |name: &str| vec![format!("observation/{name}"), name.to_owned()];
         let plain = |camera: &str| ObservationSource::Camera { camera: camera.to_owned(), half_turn: false };
@@ -462,7 +431,6 @@ impl Profile {
         Some(Self { name: name.to_owned(), inputs, actions, observe_every_step: false })
     }
 
-    /// Sensor streams that its inputs need.
     pub fn streams(&self) -> SensorStreams {
         let mut streams = SensorStreams::default();
         for input in &self.inputs {

@@ -20,7 +20,6 @@ pub struct RobotState {
     /// The same as axis-angle, rad: continuous along the episode, from the vector that is nearest to a hand that points
     /// straight down, (π, 0, 0).
     pub ee_axis_angle_b: Vec3,
-    /// Arm joint angles, rad.
     pub joints: [f64; ARM_DOFS],
     /// Arm joint velocities, rad/s.
     pub joint_velocities: [f64; ARM_DOFS],
@@ -55,7 +54,6 @@ impl Default for RobotState {
 }
 
 impl RobotState {
-    /// Tool pose in the base frame.
     pub fn tool_b(&self) -> Pose {
         Pose::from_parts(self.ee_position_b.into(), self.ee_rotation_b)
     }
@@ -72,7 +70,6 @@ pub struct RobotStream {
     pub recorded: Option<RecordedStream>,
     /// Its feature in LeRobot and RLDS datasets, which have it if the recording does.
     pub exported: Option<ExportedStream>,
-    /// Number of components.
     pub width: usize,
     /// Unit; components of several units are separated by commas.
     pub unit: &'static str,
@@ -82,16 +79,13 @@ pub struct RobotStream {
     pub is_drive: bool,
     /// Meaning: a sentence.
     pub about: &'static str,
-    /// Reads it.
     pub read: fn(&RobotState) -> Vec<f64>,
 }
 
-/// A dataset of an HDF5 file.
 #[derive(Debug)]
 pub struct RecordedStream {
     /// Path below the demonstration.
     pub path: &'static str,
-    /// Type of its numbers.
     pub number_type: NumberType,
     /// Attribute `frame`; empty for none.
     pub frame: &'static str,
@@ -101,19 +95,14 @@ pub struct RecordedStream {
     pub flag: Option<&'static str>,
 }
 
-/// Type of the numbers of a recorded stream.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum NumberType {
-    /// float64.
     F64,
-    /// float32.
     F32,
-    /// uint8.
     U8,
 }
 
 impl NumberType {
-    /// Size of a number.
     pub fn bytes(self) -> usize {
         match self {
             Self::F64 => 8,
@@ -122,7 +111,6 @@ impl NumberType {
         }
     }
 
-    /// Name in NumPy.
     pub fn name(self) -> &'static str {
         match self {
             Self::F64 => "float64",
@@ -132,20 +120,17 @@ impl NumberType {
     }
 }
 
-/// A feature of a LeRobot or RLDS dataset.
 #[derive(Debug)]
 pub struct ExportedStream {
     /// Name in the data of openpi and SoftVTBench.
     pub name: &'static str,
     /// Key in LeRobot v3.0.
     pub lerobot: &'static str,
-    /// Names of the components.
     pub components: &'static [&'static str],
     /// Meaning: a phrase.
     pub about: &'static str,
 }
 
-/// Names of the arm's joints.
 pub const JOINT_NAMES: [&str; ARM_DOFS] =
     ["joint_1", "joint_2", "joint_3", "joint_4", "joint_5", "joint_6", "joint_7"];
 
@@ -195,18 +180,6 @@ impl RecordedStream {
     const fn new(path: &'static str) -> Self {
         Self { path, number_type: NumberType::F64, frame: "", meaning: "", flag: None }
     }
-
-    const fn frame(self, frame: &'static str) -> Self {
-        Self { frame, ..self }
-    }
-
-    const fn meaning(self, meaning: &'static str) -> Self {
-        Self { meaning, ..self }
-    }
-
-    const fn with_flag(self, flag: &'static str) -> Self {
-        Self { flag: Some(flag), ..self }
-    }
 }
 
 const BASE: &str = "robot base";
@@ -241,7 +214,11 @@ pub static ROBOT_STREAMS: &[RobotStream] = {
         Stream::new(7, "m, 1", MAX_POSITION_M, "Tool position, quaternion, base.", |robot| {
             pose_row(&robot.tool_b()).to_vec()
         })
-        .recorded(Dataset::new("obs/eef_pose").frame(BASE).meaning("tool position, quaternion w x y z with w >= 0")),
+        .recorded(Dataset {
+            frame: BASE,
+            meaning: "tool position, quaternion w x y z with w >= 0",
+            ..Dataset::new("obs/eef_pose")
+        }),
         Stream::new(
             7,
             "m, rad, m",
@@ -252,11 +229,11 @@ pub static ROBOT_STREAMS: &[RobotStream] = {
                 [robot.ee_position_b.as_slice(), robot.ee_axis_angle_b.as_slice(), &finger].concat()
             },
         )
-        .recorded(
-            Dataset::new("obs/state")
-                .frame(BASE)
-                .meaning("tool position, axis-angle, position of one finger (0 shut to 0.04)"),
-        ),
+        .recorded(Dataset {
+            frame: BASE,
+            meaning: "tool position, axis-angle, position of one finger (0 shut to 0.04)",
+            ..Dataset::new("obs/state")
+        }),
         Stream::new(ARM_DOFS, "rad", MAX_ANGLE, "The seven joint angles of the arm, rad.", |robot| robot.joints.to_vec())
             .part("joints")
             .field("joints")
@@ -275,11 +252,11 @@ pub static ROBOT_STREAMS: &[RobotStream] = {
         )
         .part("joint_torques")
         .field("joint_torques")
-        .recorded(
-            Dataset::new("obs/joint_torques")
-                .meaning("torques of the arm's drives; gravity is compensated and not part of them")
-                .with_flag("joint-torques"),
-        )
+        .recorded(Dataset {
+            meaning: "torques of the arm's drives; gravity is compensated and not part of them",
+            flag: Some("joint-torques"),
+            ..Dataset::new("obs/joint_torques")
+        })
         .exported(ExportedStream {
             name: "joint_torques",
             lerobot: "observation.joint_torques",
@@ -305,9 +282,10 @@ pub static ROBOT_STREAMS: &[RobotStream] = {
             |robot| vec![robot.sensed_width_m],
         )
         .part("sensed_width")
-        .recorded(
-            Dataset::new("obs/gripper_width_sensed").meaning("the width with the steps and the offset of a real hand"),
-        ),
+        .recorded(Dataset {
+            meaning: "the width with the steps and the offset of a real hand",
+            ..Dataset::new("obs/gripper_width_sensed")
+        }),
         Stream::new(1, "m", ABOUT_ONE, "Half of the sensed width, m.", |robot| vec![0.5 * robot.sensed_width_m])
             .part("sensed_finger_position"),
         Stream::new(2, "m", ABOUT_ONE, "Both fingers in robosuite's convention, m: half the width and its negative.", |robot| {
@@ -318,12 +296,12 @@ pub static ROBOT_STREAMS: &[RobotStream] = {
         Stream::new(1, "1", ABOUT_ONE, "Measured: 1 − width / 0.08 m.", |robot| {
             vec![1.0 - robot.gripper_width_m / MAX_WIDTH]
         })
-        .recorded(Dataset::new("obs/gripper_close_norm").meaning("measured: 1 - width / 0.08 m")),
+        .recorded(Dataset { meaning: "measured: 1 - width / 0.08 m", ..Dataset::new("obs/gripper_close_norm") }),
         Stream::new(1, "1", ABOUT_ONE, "Last commanded closure, 0 open to 1 closed.", |robot| vec![robot.closure])
             .part("closure")
             .field("closure")
             .drive()
-            .recorded(Dataset::new("obs/gripper_closure").meaning("commanded last: 0 open to 1 shut")),
+            .recorded(Dataset { meaning: "commanded last: 0 open to 1 shut", ..Dataset::new("obs/gripper_closure") }),
     ]
 };
 
@@ -337,7 +315,6 @@ const PART_COUNT: usize = {
 };
 
 impl RobotStream {
-    /// Names of all parts of a profile's state.
     pub const PARTS: &[&str] = &{
         let mut names = [""; PART_COUNT];
         let (mut at, mut index) = (0, 0);
@@ -365,17 +342,14 @@ impl RobotStream {
 pub struct StatePart(&'static RobotStream);
 
 impl StatePart {
-    /// The part of a name.
     pub fn named(name: &str) -> Option<Self> {
         ROBOT_STREAMS.iter().find(|stream| stream.part == Some(name)).map(Self)
     }
 
-    /// Its declaration.
     pub fn stream(self) -> &'static RobotStream {
         self.0
     }
 
-    /// Its name.
     pub fn name(self) -> &'static str {
         self.0.part.unwrap_or_default()
     }

@@ -34,7 +34,6 @@ const D_REF: f64 = 2.0;
 /// Slip that the criteria allow, mm.
 const ALLOWED_MM: f64 = 2.0;
 
-/// An object that the goal moves.
 #[derive(Clone, Debug)]
 struct Moved {
     is_soft: bool,

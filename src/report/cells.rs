@@ -4,7 +4,6 @@ use softvt_common::text::decimal;
 use softvt_evaluation::statistics::{Distribution, Rate};
 use softvt_runs::summary::TauRange;
 
-/// Formats a rate with its interval.
 pub(crate) fn rate(rate: &Rate) -> String {
     let bounds = rate.wilson95.map(|[low, high]| format!(" [{low:.1}, {high:.1}]")).unwrap_or_default();
     rate.rate.map_or_else(|| "–".to_owned(), |value| format!("{value:.1}{bounds}"))

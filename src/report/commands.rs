@@ -6,7 +6,6 @@ use softvt_common::episode_id::EpisodeId;
 use softvt_evaluation::category::EpisodeCategory;
 use softvt_runs::{manifest::RunManifest, record::EpisodeRecord, stored_run::StoredRun};
 
-/// The command that renders an episode.
 pub fn view_command(run: &StoredRun, id: &EpisodeId) -> String {
     let RunManifest { script: main, suite, sources, folder, .. } = &run.manifest;
     let changes = run.manifest.changes();
@@ -38,7 +37,6 @@ pub fn view_command(run: &StoredRun, id: &EpisodeId) -> String {
     format!("softvt view {}", view.join(" "))
 }
 
-/// The command that simulates an episode again.
 pub fn replay_command(run: &StoredRun, id: &EpisodeId) -> String {
     let secret = if run.manifest.seed_hash.is_some() { " --seed-file FILE" } else { "" };
     format!("softvt replay {} {}/{}{secret}", quoted(&run.dir.display().to_string()), id.task, id.episode)

@@ -8,7 +8,7 @@ use std::{
 use serde::Serialize;
 
 use super::task_names::TaskName;
-use softvt_common::text::counted;
+use softvt_common::{episode_id::EpisodeId, text::counted};
 use softvt_runs::{
     paired_stats::{EpisodeKey, EpisodePair, PairedComparison, group_by_task, pair_episodes},
     record::{EpisodeHeader, EpisodeRecord},
@@ -16,16 +16,11 @@ use softvt_runs::{
     summary::{GroupScores, method_label},
 };
 
-/// Differences of one task.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct TaskDifferences {
-    /// Name of the suite.
     pub suite: String,
-    /// Index of the task in the suite.
     pub task: usize,
-    /// Instruction of the task.
     pub prompt: String,
-    /// Asset of the object.
     pub asset: String,
     /// The second run minus the first.
     #[serde(flatten)]
@@ -38,37 +33,11 @@ impl TaskDifferences {
     }
 }
 
-/// Runs of the same episodes, each compared with a reference.
-pub(super) struct Comparison<'a> {
-    /// Episodes of the reference.
-    pub(super) reference: Vec<&'a EpisodeRecord>,
-    /// The other runs.
-    pub(super) others: Vec<ComparedRun<'a>>,
-}
-
-/// A run that is compared with a reference.
 pub(super) struct ComparedRun<'a> {
     /// The episodes that both have.
     pub(super) pairs: Vec<EpisodePair<'a>>,
     /// The run minus the reference.
     pub(super) differences: PairedComparison,
-}
-
-impl<'a> Comparison<'a> {
-    pub(super) fn new<R: IntoIterator<Item = &'a EpisodeRecord>>(
-        reference: impl IntoIterator<Item = &'a EpisodeRecord>,
-        others: impl IntoIterator<Item = R>,
-    ) -> Self {
-        let reference: Vec<&EpisodeRecord> = reference.into_iter().collect();
-        let compared = |records| ComparedRun::new(reference.iter().copied(), records);
-        Self { others: others.into_iter().map(compared).collect(), reference }
-    }
-
-    /// Compares every run with those after it, so that each pair is computed once.
-    pub(super) fn of_all_pairs(runs: &[Vec<&'a EpisodeRecord>]) -> Vec<Self> {
-        let after = |at: usize| runs[at + 1..].iter().map(|run| run.iter().copied());
-        (0..runs.len()).map(|at| Self::new(runs[at].iter().copied(), after(at))).collect()
-    }
 }
 
 impl<'a> ComparedRun<'a> {
@@ -86,7 +55,6 @@ impl<'a> ComparedRun<'a> {
     }
 }
 
-/// Comparison of the runs of two folders.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct RunComparison {
     /// Policy of the first run, with its privileged inputs.
@@ -111,33 +79,24 @@ pub struct RunComparison {
     pub by_task: Vec<TaskDifferences>,
 }
 
-/// Error of comparing two runs.
-#[allow(missing_docs, reason = "the messages describe the variants")]
+/// Runs that have no episode in common, or one twice.
 #[derive(Debug, thiserror::Error)]
-pub enum CompareError {
-    #[error(
-        "{first} and {second} both hold suite {suite} task {task} episode {episode}: compare one run per suite; give its folder"
-    )]
-    DuplicateEpisode { first: String, second: String, suite: String, task: usize, episode: u32 },
-    #[error("{dir} has no episode yet")]
-    Empty { dir: String },
-    #[error("{first} and {second} share no episode: {reason}")]
-    NoCommonEpisode { first: String, second: String, reason: String },
-}
+#[error("{0}")]
+pub struct CompareError(String);
 
 /// Compares the episodes common to `first` and `second`, each the runs of one folder, one per suite.
 ///
 /// # Errors
 /// An episode occurs twice on one side, or there is no common episode.
 pub fn compare(first: &[StoredRun], second: &[StoredRun]) -> Result<RunComparison, CompareError> {
-    for runs in [first, second] {
-        check_unique(runs)?;
+    if let Some(error) = [first, second].into_iter().find_map(unusable) {
+        return Err(error);
     }
     let (twins, mut pairing) = with_twins_paired(first, second);
     let [first, second] = &twins;
     let count = |runs: &[StoredRun]| -> usize { runs.iter().map(|run| run.records.len()).sum() };
     let ComparedRun { pairs, differences } = ComparedRun::new(records(first), records(second));
-    // A public seed may equal that of the results of a judged run, whose draws are others.
+    // A public seed may equal the one in the results of a judged run, whose draws are others.
     let hashes = |runs: &[StoredRun]| runs.iter().map(seed_hash).collect::<BTreeSet<_>>();
     if pairs.is_empty() || hashes(first).is_disjoint(&hashes(second)) {
         return Err(no_common_episode(first, second));
@@ -174,13 +133,12 @@ fn other_layouts(first: &[StoredRun], second: &[StoredRun]) -> Option<String> {
     let mut differing = records(first).filter_map(|record| {
         let EpisodeHeader { id, layout, .. } = &record.header;
         let other = layouts.get(id).filter(|other| **other != layout.as_str())?;
-        let place = format!("{} task {} episode {}", id.suite, id.task, id.episode);
-        Some(format!("first: {place}, {layout} and {other}"))
+        Some(format!("{} {}, {layout} and {other}", id.suite, id.index()))
     });
     let first = differing.next()?;
     let count = 1 + differing.count();
     let (episodes, are) = (counted(count, "episode"), if count == 1 { "is" } else { "are" });
-    Some(format!("{episodes} that both runs have {are} not paired: the layouts differ ({first})"))
+    Some(format!("{episodes} that both runs have {are} not paired: the layouts differ (first: {first})"))
 }
 
 /// The runs, with the records of rigid twins under the name of the soft original if the other side has that: initial
@@ -213,28 +171,24 @@ pub(super) fn records(runs: &[StoredRun]) -> impl Iterator<Item = &EpisodeRecord
     runs.iter().flat_map(|run| &run.records)
 }
 
-/// Checks that no episode occurs twice, since one of the two would be ignored.
-pub(super) fn check_unique(runs: &[StoredRun]) -> Result<(), CompareError> {
+/// The error of a folder that has no episode, or one twice, of which one would be ignored.
+pub(super) fn unusable(runs: &[StoredRun]) -> Option<CompareError> {
     let mut known = BTreeMap::new();
     for run in runs {
-        let dir = || run.dir.display().to_string();
+        let dir = run.dir.display();
         if run.records.is_empty() && runs.len() == 1 {
-            return Err(CompareError::Empty { dir: dir() });
+            return Some(CompareError(format!("{dir} has no episode yet")));
         }
         for record in &run.records {
-            if let Some(other) = known.insert(EpisodeKey::new(record), &run.dir) {
-                let id = &record.header.id;
-                return Err(CompareError::DuplicateEpisode {
-                    first: other.display().to_string(),
-                    second: dir(),
-                    suite: id.suite.clone(),
-                    task: id.task,
-                    episode: id.episode,
-                });
+            if let Some(other) = known.insert(EpisodeKey::new(record), run.dir.display()) {
+                let EpisodeId { suite, task, episode, .. } = &record.header.id;
+                return Some(CompareError(format!(
+                    "{other} and {dir} both hold suite {suite} task {task} episode {episode}: compare one run per suite; give its folder"
+                )));
             }
         }
     }
-    Ok(())
+    None
 }
 
 /// Hash of the secret seed of a judged run.
@@ -257,19 +211,16 @@ pub(super) fn no_common_episode(first: &[StoredRun], second: &[StoredRun]) -> Co
         let describe = || format!("{name} {} in the first, {} in the second", joined(&a), joined(&b));
         a.is_disjoint(&b).then(describe)
     });
-    let dir = |runs: &[StoredRun]| runs.first().map_or_else(String::new, |run| run.dir.display().to_string());
-    CompareError::NoCommonEpisode {
-        first: dir(first),
-        second: dir(second),
-        reason: differing.unwrap_or_else(|| "their finished episodes do not overlap".to_owned()),
-    }
+    let [first, second] = [first, second]
+        .map(|runs| runs.first().map_or_else(String::new, |run| run.dir.display().to_string()));
+    let reason = differing.unwrap_or_else(|| "their finished episodes do not overlap".to_owned());
+    CompareError(format!("{first} and {second} share no episode: {reason}"))
 }
 
 fn joined(names: &BTreeSet<String>) -> String {
     names.iter().map(String::as_str).collect::<Vec<_>>().join(", ")
 }
 
-/// Policies of the runs, with their privileged inputs.
 fn policies(runs: &[StoredRun]) -> String {
     let label = |run: &StoredRun| method_label(&run.manifest.policy, run.marks());
     joined(&runs.iter().map(label).collect())
@@ -302,25 +253,15 @@ pub(super) fn differing_fields(first: &[StoredRun], second: &[StoredRun]) -> BTr
     found
 }
 
-/// One sentence for each run whose scripts or limits differ from those of the first run of its suite.
-pub fn difference_warnings<'a>(runs: impl Iterator<Item = &'a StoredRun>) -> Vec<String> {
-    let mut firsts: Vec<&StoredRun> = Vec::new();
-    let mut warnings = Vec::new();
-    for run in runs {
-        let Some(first) = firsts.iter().find(|first| first.suite() == run.suite()) else {
-            firsts.push(run);
-            continue;
-        };
+/// One sentence for each run whose scripts or limits differ from the first run of its suite.
+pub(super) fn differing_files(runs: &[&StoredRun]) -> Vec<String> {
+    let sentence = |run: &&StoredRun| {
+        let first = runs.iter().find(|first| first.suite() == run.suite())?;
         let fields = first.manifest.differing_files(&run.manifest).join(" and ");
-        if !fields.is_empty() {
-            warnings.push(format!(
-                "{} and {} have different {fields}",
-                first.dir.display(),
-                run.dir.display()
-            ));
-        }
-    }
-    warnings
+        let [first, run] = [first.dir.display(), run.dir.display()];
+        (!fields.is_empty()).then(|| format!("{first} and {run} have different {fields}"))
+    };
+    runs.iter().filter_map(sentence).collect()
 }
 
 #[cfg(test)]
@@ -329,7 +270,6 @@ mod tests {
     use crate::policy_ranking::PolicyRanking;
     use crate::{run_summary::tests::stored, sample_record};
 
-    /// A run of three episodes.
     fn run(dir: &str) -> StoredRun {
         let record = |episode: u32| {
             let mut record = sample_record();
@@ -350,7 +290,7 @@ mod tests {
         part.manifest.thresholds.insert("bun".to_owned(), Some(1.5));
         let differing = ["sources (x.lua)", "thresholds (bun)"];
         assert_eq!(compared(&whole, &part).differing_fields, differing);
-        let warnings = difference_warnings([&whole, &part, &whole].into_iter());
+        let warnings = differing_files(&[&whole, &part, &whole]);
         assert_eq!(warnings, ["a and b have different sources (x.lua) and thresholds (bun)"]);
         let three = PolicyRanking::new(&[&whole, &whole, &part].map(|run| vec![run.clone()]));
         assert_eq!(three.expect("common episodes").differing_fields, differing);

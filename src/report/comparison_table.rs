@@ -36,14 +36,9 @@ fn distinct_headings(names: [&str; 2]) -> [String; 2] {
 /// measures and all tasks.
 pub fn table(comparison: &RunComparison, format: TerminalFormat) -> String {
     let mut text = StyledText::new(format);
-    let title = format!(
-        "{} → {} · {}",
-        shortened(&comparison.first, POLICY_WIDTH),
-        shortened(&comparison.second, POLICY_WIDTH),
-        counted(comparison.all.pairs, "paired episode")
-    );
-    text.line(Emphasis::Bold, title);
     let all = &comparison.all;
+    let [first, second] = [&comparison.first, &comparison.second].map(|name| shortened(name, POLICY_WIDTH));
+    text.title(format_args!("{first} → {second} · {}", counted(all.pairs, "paired episode")));
     let [first, second] = distinct_headings([0, 1].map(|side| comparison.headings[side].as_str()));
     let mut table = difference_table(&first, &second);
     table.rows.extend(measure_rows(all, comparison.deformable, main_measures()));
@@ -56,15 +51,15 @@ pub fn table(comparison: &RunComparison, format: TerminalFormat) -> String {
         table.rows.extend(measure_rows(all, comparison.deformable, other_measures()));
         table.rows.extend(stage_rows(&all.failed_stages));
     }
-    text.plain(&table.text());
+    text.plain(table.text());
     text.end();
-    push_tasks(&mut text, comparison, format);
-    push_notes(&mut text, comparison, format);
+    push_tasks(&mut text, comparison);
+    push_notes(&mut text, comparison);
     text.into_text()
 }
 
 /// One line per task in which a rate changed, or per task with details.
-fn push_tasks(text: &mut StyledText, comparison: &RunComparison, format: TerminalFormat) {
+fn push_tasks(text: &mut StyledText, comparison: &RunComparison) {
     let tasks = &comparison.by_task;
     let named: Vec<TaskName> = tasks.iter().map(TaskDifferences::name).collect();
     let has_changed = |task: &TaskDifferences| {
@@ -72,7 +67,7 @@ fn push_tasks(text: &mut StyledText, comparison: &RunComparison, format: Termina
         [goal, no_drop, safety].iter().any(|rate| rate.better + rate.worse > 0)
     };
     let shown: Vec<(&TaskDifferences, String)> = (tasks.iter().zip(task_names(&named)))
-        .filter(|(task, _)| format.has_details || has_changed(task))
+        .filter(|(task, _)| text.format.has_details || has_changed(task))
         .collect();
     let change = |heading, width, digits: usize, of: fn(&PairedComparison) -> &PairedDifference| {
         let cell = move |(task, _): &(&TaskDifferences, String)| match of(&task.differences) {
@@ -81,7 +76,7 @@ fn push_tasks(text: &mut StyledText, comparison: &RunComparison, format: Termina
         };
         Column::number(heading, cell).width(width)
     };
-    let name_width = format.width.saturating_sub(1 + 57).clamp(14, 40);
+    let name_width = text.width().saturating_sub(57).clamp(14, 40);
     let columns = [
         Column::number("#", |(task, _): &(&TaskDifferences, String)| task.task.to_string()).width(3),
         Column::text("task", |(_, name): &(&TaskDifferences, String)| name.clone()).width(name_width),
@@ -95,42 +90,48 @@ fn push_tasks(text: &mut StyledText, comparison: &RunComparison, format: Termina
     let mut suite = "";
     for ((task, _), line) in shown.iter().zip(lines) {
         if task.suite != suite && tasks.iter().any(|other| other.suite != task.suite) {
-            text.plain(&shortened(&task.suite, format.width - 1));
+            text.plain(shortened(&task.suite, text.width()));
         }
         suite = &task.suite;
-        text.plain(&line);
+        text.plain(line);
     }
     let hidden = tasks.len() - shown.len();
     if hidden > 0 {
-        let them = format!("{} with the same rates; --details shows all", counted(hidden, "task"));
-        text.line(Emphasis::Faint, them);
+        let hidden = counted(hidden, "task");
+        text.line(Emphasis::Faint, format_args!("{hidden} with the same rates; --details shows all"));
     }
     text.end();
 }
 
-/// Legend and caveats.
-fn push_notes(text: &mut StyledText, comparison: &RunComparison, format: TerminalFormat) {
-    let mut note = |sentence: &str| text.wrapped(sentence, format.width - 1);
-    note(LEGEND);
-    note("Goal is TSR · D/limit: peak D over τ · N/A: no pair of episodes has it in both runs");
-    if format.has_details {
-        note("DSR: goal with D within τ · failed: better where more stages were completed");
+fn push_notes(text: &mut StyledText, comparison: &RunComparison) {
+    text.note(LEGEND);
+    text.note("Goal is TSR · D/limit: peak D over τ · N/A: no pair of episodes has it in both runs");
+    if text.format.has_details {
+        text.note("DSR: goal with D within τ · failed: better where more stages were completed");
     }
-    note(&e_values(&comparison.all));
-    if comparison.all.invalid_pairs > 0 {
-        note(&format!(
-            "{} with an invalid episode: failed in success rates; without D, time over τ and volumes",
-            counted(comparison.all.invalid_pairs, "pair")
+    let PairedComparison { goal, no_drop, safety, invalid_pairs, .. } = comparison.all;
+    let e_values =
+        [("Goal", goal), ("NoDrop", no_drop), ("Safety", safety)].into_iter().filter_map(|(name, rate)| {
+            let e = rate.e?;
+            Some(if e >= 1e4 { format!("{name} {e:.1e}") } else { format!("{name} {e:.2}") })
+        });
+    let e_values = e_values.collect::<Vec<_>>().join(", ");
+    text.note(format_args!("e-values: {e_values} · 20 is 5 %, also if runs are continued until then"));
+    if invalid_pairs > 0 {
+        let pairs = counted(invalid_pairs, "pair");
+        text.note(format_args!(
+            "{pairs} with an invalid episode: failed in success rates; without D, time over τ and volumes"
         ));
     }
     if comparison.unpaired > 0 {
         let verb = if comparison.unpaired == 1 { "was" } else { "were" };
         let episodes = counted(comparison.unpaired, "episode");
-        note(&format!("{episodes} present in only one run {verb} skipped"));
+        text.note(format_args!("{episodes} present in only one run {verb} skipped"));
     }
-    comparison.pairing.iter().chain(&comparison.incomplete).for_each(|sentence| note(sentence));
+    comparison.pairing.iter().chain(&comparison.incomplete).for_each(|sentence| text.note(sentence));
     if !comparison.differing_fields.is_empty() {
-        note(&format!("the runs also differ in {} (run.json)", comparison.differing_fields.join(", ")));
+        let fields = comparison.differing_fields.join(", ");
+        text.note(format_args!("the runs also differ in {fields} (run.json)"));
     }
 }
 
@@ -147,7 +148,6 @@ fn other_measures() -> impl Iterator<Item = &'static Measure> {
 
 /// Width of a run's name in the headings, columns.
 const HEADING_WIDTH: usize = 8;
-/// Width of the name of a measure, columns.
 const NAME_WIDTH: usize = 18;
 
 /// A table of differences without rows: measure, both values, difference, better, worse, interval and p.
@@ -170,7 +170,6 @@ fn difference_table(first: &str, second: &str) -> Table {
     Table { columns: headings.map(heading).to_vec(), ..Table::default() }
 }
 
-/// The table of a condition and its reference.
 pub(super) fn condition_differences(paired: &PairedComparison, deformable: bool) -> String {
     let mut table = difference_table("ref.", "cond.");
     table.rows.extend(measure_rows(paired, deformable, main_measures().take(4)));
@@ -229,20 +228,7 @@ fn stage_rows(stages: &PairedStages) -> Vec<Vec<String>> {
     std::iter::once(total).chain(of_stage).collect()
 }
 
-/// Legend of the columns.
 pub(super) const LEGEND: &str = "diff.: right minus left · better, worse: number of episodes; a lower D is better · 95 % intervals: Agresti and Min for rates, bootstrap for others (n≥10) · p: McNemar's exact test of rates, Wilcoxon's signed-rank test of others";
-
-/// The e-values of the rates, which a reader who watches a run may use.
-fn e_values(paired: &PairedComparison) -> String {
-    let rates = [("Goal", paired.goal), ("NoDrop", paired.no_drop), ("Safety", paired.safety)];
-    let known = rates.iter().filter_map(|(name, rate)| Some(format!("{name} {}", e_value_text(rate.e?))));
-    let known: Vec<String> = known.collect();
-    format!("e-values: {} · 20 is 5 %, also if runs are continued until then", known.join(", "))
-}
-
-fn e_value_text(e: f64) -> String {
-    if e >= 1e4 { format!("{e:.1e}") } else { format!("{e:.2}") }
-}
 
 #[cfg(test)]
 mod tests {

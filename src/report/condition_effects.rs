@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 
 use super::{
     cells::{interval, signed},
-    comparison::Comparison,
+    comparison::ComparedRun,
     run_summary::RunSummary,
 };
 use softvt_common::table::{Column, Table};
@@ -16,16 +16,12 @@ use softvt_runs::{
     stored_run::{ConditionLabel, records_as},
 };
 
-/// The conditions of a suite and a policy.
 #[derive(Clone, Debug)]
 pub struct ConditionEffects {
-    /// Name of the suite in results.
     pub suite: String,
-    /// Name of the reference.
     pub method: String,
     /// In the order of factors and values.
     pub effects: Vec<ConditionEffect>,
-    /// The reference itself.
     pub reference: TrendPoint,
     /// Mean change of Goal Success over all conditions, percentage points; its interval is over episodes.
     pub mean_goal: PairedDifference,
@@ -33,17 +29,10 @@ pub struct ConditionEffects {
     pub mean_safety: PairedDifference,
 }
 
-/// A condition against the reference.
 #[derive(Clone, Debug)]
 pub struct ConditionEffect {
-    /// The changed factor.
     pub change: ConditionLabel,
-    /// Goal Success under the condition.
-    pub goal: Rate,
-    /// Safety Success under the condition.
-    pub safety: Rate,
-    /// Peak D over τ of each valid episode that has both.
-    pub d_over_tau: Vec<f64>,
+    pub point: TrendPoint,
     /// The condition minus the reference, on the same episodes.
     pub differences: PairedComparison,
 }
@@ -70,22 +59,23 @@ fn effects_of_group(group: &[&RunSummary]) -> Option<ConditionEffects> {
     let mut conditions: Vec<(ConditionLabel, Vec<EpisodeRecord>)> =
         group.iter().filter_map(of_condition).collect();
     conditions.sort_by(|(a, _), (b, _)| a.compare(b));
-    let compared = Comparison::new(&reference_records, conditions.iter().map(|(_, records)| records));
     let mut effects = Vec::new();
     let mut changed: BTreeMap<_, Vec<&EpisodeRecord>> = BTreeMap::new();
-    for ((change, _), run) in conditions.iter().zip(&compared.others) {
+    for (change, records) in &conditions {
+        let run = ComparedRun::new(&reference_records, records);
         if run.pairs.is_empty() {
             continue;
         }
-        let scores = run.scores();
         effects.push(ConditionEffect {
+            point: TrendPoint {
+                value: change.value,
+                safety: run.scores().soft_safety_rate(),
+                d_over_tau: run.pairs.iter().filter_map(|pair| pair.second.d_over_tau()).collect(),
+            },
             change: change.clone(),
-            goal: scores.goal_success_rate,
-            safety: scores.soft_safety_rate(),
-            d_over_tau: run.pairs.iter().filter_map(|pair| pair.second.d_over_tau()).collect(),
-            differences: run.differences.clone(),
+            differences: run.differences,
         });
-        for EpisodePair { first, second } in &run.pairs {
+        for EpisodePair { first, second } in run.pairs {
             changed.entry(first.header.id.index()).or_default().push(second);
         }
     }
@@ -97,7 +87,7 @@ fn effects_of_group(group: &[&RunSummary]) -> Option<ConditionEffects> {
             if record.outcome.is_valid() && test(record) { 100.0 } else { 0.0 }
         };
         // One value per episode: its mean over the conditions. Episodes are independent, their conditions are not.
-        let pairs = compared.reference.iter().filter_map(|record| {
+        let pairs = reference_records.iter().filter_map(|record| {
             let others = changed.get(&record.header.id.index())?;
             let mean = others.iter().map(|record| percent(record)).sum::<f64>() / others.len() as f64;
             Some([percent(record), mean])
@@ -121,7 +111,6 @@ fn effects_of_group(group: &[&RunSummary]) -> Option<ConditionEffects> {
     })
 }
 
-/// A difference with its interval and sign.
 fn signed_with_interval(difference: &PairedDifference, digits: usize) -> String {
     let value = signed(difference.difference, digits);
     match (difference.difference, difference.interval95) {
@@ -130,7 +119,6 @@ fn signed_with_interval(difference: &PairedDifference, digits: usize) -> String 
     }
 }
 
-/// A row of the table of effects.
 struct EffectRow<'a> {
     suite: &'a ConditionEffects,
     condition: String,
@@ -163,7 +151,7 @@ pub fn effects_table(effects: &[ConditionEffects]) -> Option<Table> {
         Column::number(heading, move |row: &EffectRow| signed_with_interval(&of(row), digits))
     };
     let columns = [
-        Column::text("Suite", |row: &EffectRow| format!("{}, {}", row.suite.suite, row.suite.method)),
+        Column::text("Suite", |row: &EffectRow| row.suite.name()),
         Column::text("Condition", |row: &EffectRow| row.condition.clone()),
         Column::number("Episodes", |row: &EffectRow| row.episodes.to_string()),
         change("Δ Goal", 1, |row| row.goal),
@@ -178,7 +166,6 @@ pub fn effects_table(effects: &[ConditionEffects]) -> Option<Table> {
 /// Values of a factor with at least two, for its trend.
 #[derive(Clone, Debug)]
 pub struct FactorTrend {
-    /// Name of the factor.
     pub factor: String,
     /// One point per value, in their order.
     pub points: Vec<TrendPoint>,
@@ -189,7 +176,6 @@ pub struct FactorTrend {
 pub struct TrendPoint {
     /// Value of the factor; `None` for the reference.
     pub value: Option<f64>,
-    /// Safety Success.
     pub safety: Rate,
     /// Peak D over τ of each episode.
     pub d_over_tau: Vec<f64>,
@@ -203,17 +189,15 @@ impl TrendPoint {
 }
 
 impl ConditionEffects {
+    pub fn name(&self) -> String {
+        format!("{}, {}", self.suite, self.method)
+    }
+
     /// Factors with at least two values, in order.
     pub fn trends(&self) -> Vec<FactorTrend> {
         let of_factor = |effects: &[ConditionEffect]| {
-            let point = |effect: &ConditionEffect| {
-                Some(TrendPoint {
-                    value: Some(effect.change.value?),
-                    safety: effect.safety,
-                    d_over_tau: effect.d_over_tau.clone(),
-                })
-            };
-            let points: Vec<TrendPoint> = effects.iter().filter_map(point).collect();
+            let points = effects.iter().map(|effect| &effect.point).filter(|point| point.value.is_some());
+            let points: Vec<TrendPoint> = points.cloned().collect();
             (points.len() > 1).then(|| FactorTrend { factor: effects[0].change.factor.clone(), points })
         };
         self.effects.chunk_by(|a, b| a.change.factor == b.change.factor).filter_map(of_factor).collect()

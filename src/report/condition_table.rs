@@ -6,7 +6,7 @@ use super::{
     cells::signed,
     comparison::ComparedRun,
     comparison_table::{LEGEND, condition_differences},
-    styled_text::{Emphasis, StyledText, TerminalFormat},
+    styled_text::{StyledText, TerminalFormat},
 };
 use softvt_benchmark::ShiftValue;
 use softvt_common::{
@@ -21,20 +21,15 @@ use softvt_runs::{
     summary::GroupScores,
 };
 
-/// Results under one condition.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ConditionOutcome {
-    /// Its run folder, relative to that of all conditions.
+    /// Its run folder, relative to the folder of all conditions.
     pub folder: String,
-    /// Number of episodes.
     pub episodes: usize,
     /// Number of invalid episodes, which count as failed.
     pub invalid: usize,
-    /// Goal Success.
     pub goal_success_rate: Rate,
-    /// NoDrop.
     pub no_drop_rate: Rate,
-    /// Safety Success.
     pub safety_success_rate: Rate,
     /// Peak D divided by τ, of valid episodes that have both.
     pub d_over_tau: Distribution,
@@ -43,7 +38,7 @@ pub struct ConditionOutcome {
 }
 
 impl ConditionOutcome {
-    /// Results of `records`, compared with those of the reference.
+    /// Results of `records`, compared with the reference.
     pub fn new(folder: String, records: &[EpisodeRecord], reference: Option<&[EpisodeRecord]>) -> Self {
         let paired = reference.map(|reference| {
             let name = reference.first().map_or("", |record| &record.header.id.suite);
@@ -63,18 +58,14 @@ impl ConditionOutcome {
     }
 }
 
-/// One condition of a suite.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ConditionRow {
-    /// Name of the condition.
     pub condition: String,
     /// True for the rigid twin of the suite, paired with the reference by task and episode.
     pub rigid_twin: bool,
-    /// Shifts by name and value.
     pub shift: Vec<ShiftValue>,
-    /// Changed settings by path and value.
     pub set: Vec<(String, String)>,
-    /// Policy in place of that of the reference; absent for the same.
+    /// Policy in place of the reference's; absent for the same.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub policy: Option<String>,
     /// True if the policy keeps one number constant, by what shows of an object.
@@ -95,13 +86,11 @@ impl ConditionRow {
 /// A suite under all conditions, the reference first.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ConditionTable {
-    /// Name of the suite in results.
     pub suite: String,
     /// Policy name with its privileged inputs.
     pub policy: String,
     /// True if targets deform, so that D/τ is defined.
     pub deformable: bool,
-    /// One row per condition.
     pub rows: Vec<ConditionRow>,
 }
 
@@ -111,10 +100,9 @@ pub fn table(suite: &ConditionTable, format: TerminalFormat) -> String {
     let mut text = StyledText::new(format);
     let conditions = counted(suite.rows.len().saturating_sub(1), "condition");
     let episodes = suite.rows.iter().find_map(|row| row.outcome.as_ref()).map_or(0, |o| o.episodes);
-    let title =
-        format!("{} · {} · {conditions} · {} each", suite.suite, suite.policy, counted(episodes, "episode"));
-    text.line(Emphasis::Bold, shortened(&title, format.width - 1));
-    let width = format.width.saturating_sub(1 + 51).clamp(16, 40);
+    let episodes = counted(episodes, "episode");
+    text.title(format_args!("{} · {} · {conditions} · {episodes} each", suite.suite, suite.policy));
+    let width = text.width().saturating_sub(51).clamp(16, 40);
     let number = |heading, width, cell: fn(&ConditionRow, &ConditionTable) -> String| {
         Column::number(heading, move |row: &ConditionRow| cell(row, suite)).width(width)
     };
@@ -135,41 +123,34 @@ pub fn table(suite: &ConditionTable, format: TerminalFormat) -> String {
         }),
         number("Δ D/limit", 11, |row, _| change(row.paired(), 2, |of| of.d_over_tau)),
     ];
-    text.plain(&Table::new(&suite.rows, columns).text());
-    let mut note = |sentence: &str| text.wrapped(sentence, format.width - 1);
-    for row in &suite.rows {
-        if let Some(why) = &row.not_applicable {
-            note(&format!("{}: N/A, {why}", row.condition));
+    text.plain(Table::new(&suite.rows, columns).text());
+    for ConditionRow { condition, not_applicable, outcome, .. } in &suite.rows {
+        if let Some(why) = not_applicable {
+            text.note(format_args!("{condition}: N/A, {why}"));
         }
-        if let Some(outcome) = row.outcome.as_ref().filter(|outcome| outcome.invalid > 0) {
+        if let Some(outcome) = outcome.as_ref().filter(|outcome| outcome.invalid > 0) {
             let invalid = counted(outcome.invalid, "invalid episode");
-            note(&format!("{}: {invalid}, counted as failed", row.condition));
+            text.note(format_args!("{condition}: {invalid}, counted as failed"));
         }
     }
-    note(
+    text.note(
         "Δ: change from the reference on the same episodes · D/limit: mean of peak D over τ · *: p < 0.05 (paired tests)",
     );
     if format.has_details {
-        push_details(&mut text, suite, format);
+        for row in &suite.rows {
+            let Some(paired) = row.paired() else { continue };
+            text.end();
+            text.title(&row.condition);
+            text.plain(condition_differences(paired, suite.deformable));
+        }
+        text.end();
+        text.note(LEGEND);
     }
     text.into_text()
 }
 
-/// All paired differences, one block per condition.
-fn push_details(text: &mut StyledText, suite: &ConditionTable, format: TerminalFormat) {
-    for row in &suite.rows {
-        let Some(paired) = row.paired() else { continue };
-        text.end();
-        text.line(Emphasis::Bold, shortened(&row.condition, format.width - 1));
-        text.plain(&condition_differences(paired, suite.deformable));
-    }
-    text.end();
-    text.wrapped(LEGEND, format.width - 1);
-}
-
 /// Columns of the name of a policy in [`controllers_table`].
 const POLICY_WIDTH: usize = 22;
-/// Characters of the column of a suite.
 const SUITE_WIDTH: usize = 18;
 
 /// True if the conditions differ from the reference in the policy alone.

@@ -5,9 +5,7 @@ use softvt_media::{
     drawing::Tone,
 };
 
-/// Place of D/τ on the axis.
 const SCALE: Scale = Scale::Logarithmic { from: 0.05, to: 50.0 };
-/// Labelled values of the axis.
 pub(crate) const D_TICKS: [f64; 6] = [0.1, 0.3, 1.0, 3.0, 10.0, 30.0];
 
 /// Place of D/τ on the axis, 0 to 1 within its ends.
@@ -15,7 +13,7 @@ pub(crate) fn d_share(d_over_tau: f64) -> f64 {
     SCALE.share(d_over_tau)
 }
 
-/// The axis as that of a chart in a video.
+/// The axis for a chart in a video.
 pub(crate) fn d_axis() -> Axis {
     let tick = |value: f64| match value {
         1.0 => Tick { value, label: "τ".to_owned(), tone: Tone::Harm },

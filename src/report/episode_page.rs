@@ -9,7 +9,7 @@ use maud::{DOCTYPE, Markup, PreEscaped, html};
 
 use crate::{
     run_summary::failures,
-    video::{CLOSE_UP_STILL, worst_state},
+    video::{CLOSE_UP_STILL, place, worst_state},
 };
 use softvt_benchmark::CONTROL_DT;
 use softvt_common::{
@@ -41,7 +41,7 @@ const STILLS: [(&str, &str); 7] = [
 ];
 /// Cameras with depth and segmentation.
 const CAMERAS: [&str; 2] = ["third_person", "wrist"];
-/// Colours of the objects of a segmentation, in turn: those of Okabe and Ito.
+/// Colours of the objects of a segmentation, in turn, by Okabe and Ito.
 const OBJECT_COLOURS: [[u8; 3]; 7] = [
     [86, 180, 233],
     [230, 159, 0],
@@ -56,7 +56,7 @@ const STYLE: &str = "body{margin:1.5rem auto;max-width:70rem;padding:0 1rem;font
     video{width:100%;max-width:46rem}ul{display:grid;grid-template-columns:repeat(auto-fill,minmax(min(13rem,46%),1fr));\
     gap:.7rem;list-style:none;padding:0}img{width:100%;height:auto;display:block;border-radius:5px}li{font-size:13px}";
 
-/// What the page of several policies has in addition.
+/// Further style of the page of several policies.
 const STYLE_OF_SEVERAL: &str =
     "h3{font-size:13px;margin:.8rem 0 .3rem}.said{display:block}.said li{font-size:15px}";
 
@@ -73,7 +73,6 @@ pub struct DeformationTimes {
 }
 
 impl DeformationTimes {
-    /// Those of a recorded episode.
     pub fn new(states: &StateRecording) -> Self {
         let time_s = |state: usize| state as f64 * CONTROL_DT;
         let passed = states.deformation.iter().position(|of| of.is_some_and(|of| of.is_over()));
@@ -82,7 +81,7 @@ impl DeformationTimes {
     }
 }
 
-/// What was seen in an episode, and why it failed: "✗ over the limit: D 1.93 % = 5.14 × limit at 4.95 s; above the
+/// Result of an episode, and reasons of a failure: "✗ over the limit: D 1.93 % = 5.14 × limit at 4.95 s; above the
 /// limit from 4.20 s, in the stage place".
 pub fn sentence(record: &EpisodeRecord, times: &DeformationTimes) -> String {
     // An object that was hardly touched is not described by its D.
@@ -105,34 +104,28 @@ pub fn sentence(record: &EpisodeRecord, times: &DeformationTimes) -> String {
 }
 
 /// An episode under one of several policies.
-pub struct PolicyPart {
-    /// Its record.
-    pub record: EpisodeRecord,
-    /// When it was deformed most.
+pub struct PolicyPart<'a> {
+    pub record: &'a EpisodeRecord,
     pub times: DeformationTimes,
-    /// Name of the folder of its stills in that of the page.
+    /// Name of the folder of its stills in the folder of the page.
     pub folder: String,
 }
 
-impl PolicyPart {
-    /// What was seen under the policy: "expert: ● safe: D 0.09 % = 0.36 × limit at 4.45 s".
+impl PolicyPart<'_> {
+    /// Result under the policy: "expert: ● safe: D 0.09 % = 0.36 × limit at 4.45 s".
     pub fn sentence(&self) -> String {
-        format!("{}: {}", self.record.header.policy, sentence(&self.record, &self.times))
+        format!("{}: {}", self.record.header.policy, sentence(self.record, &self.times))
     }
 }
 
 /// Writes [`PAGE`] about one episode under several policies: a sentence for each, the video in the folder `dir`, and
-/// each policy's stills, with a link to the page of its own that is written beside them.
-///
-/// # Errors
-/// A page cannot be written.
+/// each policy's stills, with a link to the page of its own that is written next to them.
 pub fn write_several(parts: &[PolicyPart], dir: &Path) -> Result<(), FileError> {
     let Some(PolicyPart { record, .. }) = parts.first() else { return Ok(()) };
     for PolicyPart { record, times, folder } in parts {
         write(record, times, &dir.join(folder))?;
     }
-    let id = &record.header.id;
-    let title = format!("{} · task {} · episode {}", id.suite, id.task, id.episode);
+    let title = place(record);
     let contents = html! {
         h1 { (title) }
         p { (record.header.prompt) }
@@ -153,13 +146,9 @@ pub fn write_several(parts: &[PolicyPart], dir: &Path) -> Result<(), FileError> 
 
 /// Writes [`PAGE`] about the video and the stills in the folder `dir`. Depth and segmentation, which viewers show white
 /// and black, are drawn in grey and in colours.
-///
-/// # Errors
-/// The page cannot be written.
 pub fn write(record: &EpisodeRecord, times: &DeformationTimes, dir: &Path) -> Result<(), FileError> {
     let header = &record.header;
-    let id = &header.id;
-    let title = format!("{} · task {} · episode {} · {}", id.suite, id.task, id.episode, header.policy);
+    let title = place(record) + " · " + &header.policy;
     let contents = html! {
         h1 { (sentence(record, times)) }
         p { (title) br; (header.prompt) }
@@ -185,7 +174,7 @@ fn page(title: &str, style: &str, contents: &Markup) -> String {
     escape_control(&markup.into_string()).into_owned()
 }
 
-/// The stills of a moment; `folder` is that of their files in `dir`, with a slash, or empty.
+/// The stills of a moment; `folder` has their files in `dir`, with a slash, or is empty.
 fn stills(moment: &str, words: &str, dir: &Path, folder: &str) -> Markup {
     let still = |source: String, what: &str| {
         html! { li { img src=(source) alt=(format!("{words}: {what}")); (what) } }
@@ -284,7 +273,7 @@ mod tests {
         );
         assert_eq!(page.matches("<img ").count(), 2, "{page}");
         record.header.policy = "a<b".to_owned();
-        let part = PolicyPart { record, times: at_one_second(), folder: "a_b".to_owned() };
+        let part = PolicyPart { record: &record, times: at_one_second(), folder: "a_b".to_owned() };
         std::fs::create_dir(root.path().join("a_b")).unwrap();
         RgbImage::new(4, 4).save(root.path().join("a_b/worst_wrist.png")).unwrap();
         write_several(&[part], root.path()).unwrap();

@@ -49,7 +49,7 @@ fn row(RunSummary { run, summary, method }: &RunSummary) -> Value {
     })
 }
 
-/// SHA-256 of the names and hashes of all files but that of the policy.
+/// SHA-256 of the names and hashes of all files but the policy's.
 fn sources_sha256(RunManifest { sources, policy_file, .. }: &RunManifest) -> String {
     let sources = sources.iter().filter(|(name, _)| Some(*name) != policy_file.as_ref());
     let sources: BTreeMap<&str, &String> = sources.map(|(name, hash)| (in_project(name), hash)).collect();

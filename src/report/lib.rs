@@ -1,7 +1,7 @@
 //! Presentation of runs: result tables, comparison, HTML report, videos and MCAP files.
 //!
 //! [`run_summary`] summarises stored runs, and the other modules show them.
-#![warn(missing_docs, unreachable_pub)]
+#![warn(unreachable_pub)]
 
 #[cfg(test)]
 mod agreement;
@@ -28,7 +28,7 @@ pub mod terminal;
 mod terminal_details;
 pub mod video;
 
-/// The manifest of a run of one episode, that of [`sample_record`].
+/// The manifest of a run of one episode, [`sample_record`].
 #[cfg(test)]
 pub(crate) fn sample_manifest() -> softvt_runs::manifest::RunManifest {
     let manifest = serde_json::from_str(include_str!("../../tests/data/run.json")).expect("a valid manifest");

@@ -5,9 +5,7 @@ use std::{cmp::Reverse, collections::BTreeSet};
 use serde::Serialize;
 
 use super::{
-    comparison::{
-        CompareError, Comparison, check_unique, differing_fields, names, no_common_episode, records,
-    },
+    comparison::{CompareError, ComparedRun, differing_fields, names, no_common_episode, records, unusable},
     styled_text::TerminalFormat,
 };
 use softvt_common::{
@@ -31,9 +29,7 @@ const LEVEL: f64 = 0.05;
 pub struct RankedRun {
     /// Policy, or the folder if the policies have one name, with its privileged inputs.
     pub name: String,
-    /// Goal Success over the common episodes.
     pub goal: Rate,
-    /// Safety Success over the common episodes.
     pub safety: Rate,
     /// Median of peak D over τ.
     pub d_over_tau: Option<f64>,
@@ -50,7 +46,6 @@ pub struct PolicyRanking {
     pub episodes: usize,
     /// Level of the tests, adjusted for their number by Holm's method.
     pub level: f64,
-    /// The runs.
     pub runs: Vec<RankedRun>,
     /// Fields of `run.json`, other than the policy, in which a run differs from the first one.
     pub differing_fields: Vec<String>,
@@ -62,7 +57,9 @@ impl PolicyRanking {
     /// # Errors
     /// An episode occurs twice in a folder, or there is no episode that all folders have.
     pub fn new(folders: &[Vec<StoredRun>]) -> Result<Self, CompareError> {
-        folders.iter().try_for_each(|runs| check_unique(runs))?;
+        if let Some(error) = folders.iter().find_map(|runs| unusable(runs)) {
+            return Err(error);
+        }
         let Some((first, rest)) = folders.split_first() else {
             return Ok(Self { episodes: 0, level: LEVEL, runs: Vec::new(), differing_fields: Vec::new() });
         };
@@ -84,10 +81,18 @@ impl PolicyRanking {
             ranked.push((name, GroupScores::from_records(&records), records));
         }
         ranked.sort_by_key(|(_, scores, _)| Reverse(scores.count(EpisodeCategory::Safe)));
-        let records: Vec<Vec<&EpisodeRecord>> = ranked.iter().map(|(.., records)| records.clone()).collect();
-        let compared = Comparison::of_all_pairs(&records);
+        let count = ranked.len();
+        let pairs: Vec<[usize; 2]> = (0..count).flat_map(|a| (a + 1..count).map(move |b| [a, b])).collect();
+        let compare = |&[a, b]: &[usize; 2]| {
+            ComparedRun::new(ranked[a].2.iter().copied(), ranked[b].2.iter().copied()).differences
+        };
+        let compared: Vec<PairedComparison> = pairs.iter().map(compare).collect();
         let letters_of = |of: fn(&PairedComparison) -> &PairedDifference| {
-            letters_of(records.len(), |a, b| of(&compared[a].others[b - a - 1].differences).p)
+            // Without a p-value, two runs do not differ.
+            let p_values: Vec<f64> = compared.iter().map(|pair| of(pair).p.unwrap_or(1.0)).collect();
+            let adjusted = holm(&p_values);
+            let at = |a: usize, b: usize| pairs.iter().position(|pair| *pair == [a.min(b), a.max(b)]);
+            letters(count, |a, b| at(a, b).is_some_and(|at| adjusted[at] < LEVEL))
         };
         let letters = letters_of(|of| &of.safety).into_iter().zip(letters_of(|of| &of.d_over_tau));
         let runs =
@@ -109,7 +114,6 @@ impl PolicyRanking {
         })
     }
 
-    /// The ranking as a plain-text table.
     pub fn table(&self) -> String {
         let columns = [
             Column::text("policy", |run: &RankedRun| run.name.clone()).width(28),
@@ -134,16 +138,6 @@ impl PolicyRanking {
         }
         lines.join("\n") + "\n"
     }
-}
-
-/// Letters of runs whose pairs have these p-values; without one, two runs do not differ.
-fn letters_of(count: usize, p_value: impl Fn(usize, usize) -> Option<f64>) -> Vec<String> {
-    let pairs: Vec<[usize; 2]> = (0..count).flat_map(|a| (a + 1..count).map(move |b| [a, b])).collect();
-    let p_values: Vec<f64> = pairs.iter().map(|&[a, b]| p_value(a, b).unwrap_or(1.0)).collect();
-    let adjusted = holm(&p_values);
-    letters(count, |a, b| {
-        pairs.iter().position(|pair| *pair == [a.min(b), a.max(b)]).is_some_and(|at| adjusted[at] < LEVEL)
-    })
 }
 
 fn interval(rate: &Rate) -> String {

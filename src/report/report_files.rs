@@ -8,7 +8,7 @@ use std::{
 use super::{
     leaderboard,
     page::{self, Thumbnails},
-    run_summary::{RunSummary, warnings},
+    run_summary::{RunSummary, caveats},
     tables::{
         all_tables,
         formats::{escape_markdown, latex, markdown},
@@ -21,10 +21,8 @@ use softvt_common::{
 
 /// Name of the page in the folder of a report.
 pub const PAGE: &str = "report.html";
-/// Name of the tables as Markdown.
 pub const MARKDOWN: &str = "report.md";
 
-/// The names of all files of a report.
 const FILES: [&str; 4] = [PAGE, MARKDOWN, "report.tex", "report.jsonl"];
 
 /// Comment at the top of the LaTeX file: the packages and engines it needs.
@@ -43,9 +41,6 @@ pub fn foreign_file(out: &Path) -> Option<PathBuf> {
 
 /// Writes [`PAGE`], [`MARKDOWN`], `report.tex` and `report.jsonl` about some runs into the folder `out`. The page shows
 /// the objects that have a picture in `thumbnails`.
-///
-/// # Errors
-/// A file cannot be written.
 pub fn write(runs: &[RunSummary], thumbnails: &Thumbnails, out: &Path) -> Result<(), FileError> {
     // Links of the page lead from this folder.
     fs::create_dir_all(out).map_err(FileError::io("create", out))?;
@@ -53,7 +48,7 @@ pub fn write(runs: &[RunSummary], thumbnails: &Thumbnails, out: &Path) -> Result
     let joined = |format: fn(&Table) -> String| tables.iter().map(format).collect::<Vec<_>>().join("\n");
     let texts = [
         page::page(runs, thumbnails, out),
-        warnings(runs).iter().map(|warning| escape_markdown(warning) + "\n\n").collect::<String>()
+        caveats(runs).iter().map(|warning| escape_markdown(warning) + "\n\n").collect::<String>()
             + &joined(markdown),
         LATEX_HEADER.to_owned() + &joined(latex),
         leaderboard::rows(runs),

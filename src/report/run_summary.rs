@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use super::comparison::difference_warnings;
+use super::comparison::differing_files;
 use softvt_common::text::decimal;
 use softvt_evaluation::{drop::DropReason, verdict::Outcome};
 use softvt_runs::{
@@ -11,23 +11,17 @@ use softvt_runs::{
     summary::{GroupScores, MethodMarks, SuiteSummary},
 };
 
-/// A run with its results.
 #[derive(Clone, Debug)]
 pub struct RunSummary {
-    /// The run.
     pub run: StoredRun,
-    /// Its rates and distributions.
     pub summary: SuiteSummary,
     /// Policy, its privileged inputs, and what distinguishes this run from others of its suite.
     pub method: String,
 }
 
-/// An episode that is not safe.
 #[derive(Clone, Debug)]
 pub struct UnsafeEpisode<'a> {
-    /// Its record.
     pub record: &'a EpisodeRecord,
-    /// Why it is not safe.
     pub reason: String,
 }
 
@@ -75,32 +69,29 @@ fn summarize(run: StoredRun) -> RunSummary {
 }
 
 /// Caveats of the results of these runs, one sentence each.
-pub fn warnings(runs: &[RunSummary]) -> Vec<String> {
+pub fn caveats(runs: &[RunSummary]) -> Vec<String> {
     let of_run = |run: &RunSummary| {
         let dir = run.run.dir.display();
         let notes = run.summary.attempt_notes().into_iter().map(|note| format!("{dir}: {note}"));
         run.run.warnings().into_iter().chain(notes).collect::<Vec<_>>()
     };
-    runs.iter().flat_map(of_run).chain(difference_warnings(runs.iter().map(|run| &run.run))).collect()
+    let stored: Vec<&StoredRun> = runs.iter().map(|run| &run.run).collect();
+    runs.iter().flat_map(of_run).chain(differing_files(&stored)).collect()
 }
 
 impl RunSummary {
-    /// The scores of all its episodes.
     pub fn scores(&self) -> &GroupScores {
         &self.summary.scores
     }
 
-    /// True if its targets deform.
     pub fn is_soft(&self) -> bool {
         self.summary.scores.is_soft()
     }
 
-    /// Suite and method.
     pub fn name(&self) -> String {
         format!("{}, {}", self.summary.suite, self.method)
     }
 
-    /// Unsafe episodes with their reasons.
     pub fn unsafe_episodes(&self) -> Vec<UnsafeEpisode<'_>> {
         self.run
             .records
@@ -110,7 +101,7 @@ impl RunSummary {
     }
 }
 
-/// How the outcome, the controller, the goal and a drop made an episode fail.
+/// Reasons of a failure: the outcome, the controller, the goal and a drop.
 pub fn failures(record: &EpisodeRecord) -> Vec<String> {
     let (v, mut parts) = (&record.verdict, Vec::new());
     match &record.outcome {
@@ -179,7 +170,6 @@ pub(super) mod tests {
     use softvt_evaluation::{drop::DropEvent, stage::TaskStage};
     use softvt_runs::manifest::{ReplaySource, RunManifest};
 
-    /// A shift of a run.
     pub(crate) fn shift(name: &str, value: f64) -> ShiftValue {
         ShiftValue { name: name.to_owned(), value }
     }

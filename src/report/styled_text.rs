@@ -1,11 +1,13 @@
 //! Text for a terminal, with colours where the terminal has them.
 
+use std::fmt::{Display, Write};
+
 use anstyle::{Ansi256Color, AnsiColor, Style};
 
-use softvt_common::text::escape_control;
+use softvt_common::text::{escape_control, shortened};
 use softvt_evaluation::category::EpisodeCategory;
 
-/// How a table for a terminal is laid out.
+/// Layout of tables for a terminal.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct TerminalFormat {
     /// Width of the terminal, columns.
@@ -23,13 +25,11 @@ impl TerminalFormat {
     /// A pipe: no colours, [`Self::DEFAULT_WIDTH`] columns.
     pub const PLAIN: Self = Self { width: Self::DEFAULT_WIDTH, is_coloured: false, has_details: false };
 
-    /// With all rows and figures.
     pub fn with_details(self) -> Self {
         Self { has_details: true, ..self }
     }
 }
 
-/// Emphasis of a part of a text.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Emphasis {
     None,
@@ -39,7 +39,7 @@ pub(crate) enum Emphasis {
 }
 
 impl Emphasis {
-    /// Colours that are legible on light and on dark terminals, near those of the pages.
+    /// Colours that are legible on light and on dark terminals, near the colours of the pages.
     fn style(self) -> Style {
         let coloured = |number: u8| Style::new().fg_color(Some(Ansi256Color(number).into()));
         match self {
@@ -60,18 +60,27 @@ impl Emphasis {
 #[derive(Clone, Debug)]
 pub(crate) struct StyledText {
     text: String,
-    is_coloured: bool,
+    pub(crate) format: TerminalFormat,
 }
 
 impl StyledText {
     pub(crate) fn new(format: TerminalFormat) -> Self {
-        Self { text: String::new(), is_coloured: format.is_coloured }
+        Self { text: String::new(), format }
     }
 
-    /// Appends a part of a line.
-    pub(crate) fn push(&mut self, emphasis: Emphasis, part: impl AsRef<str>) -> &mut Self {
-        let (style, part) = (emphasis.style(), escape_control(part.as_ref()).into_owned());
-        self.text += &if self.is_coloured { format!("{style}{part}{style:#}") } else { part };
+    /// Longest line, characters.
+    pub(crate) fn width(&self) -> usize {
+        self.format.width - 1
+    }
+
+    pub(crate) fn push(&mut self, emphasis: Emphasis, part: impl Display) -> &mut Self {
+        let (style, part) = (emphasis.style(), part.to_string());
+        let part = escape_control(&part);
+        // Writing to memory does not fail.
+        let _ = match self.format.is_coloured {
+            true => write!(self.text, "{style}{part}{style:#}"),
+            false => self.text.write_str(&part),
+        };
         self
     }
 
@@ -81,25 +90,30 @@ impl StyledText {
         self.text.push('\n');
     }
 
-    /// Appends a line.
-    pub(crate) fn line(&mut self, emphasis: Emphasis, text: impl AsRef<str>) {
+    pub(crate) fn line(&mut self, emphasis: Emphasis, text: impl Display) {
         self.push(emphasis, text).end();
     }
 
-    /// Appends whole lines without emphasis.
-    pub(crate) fn plain(&mut self, lines: &str) {
-        lines.lines().for_each(|line| self.line(Emphasis::None, line));
+    /// Appends a bold line, cut to the width.
+    pub(crate) fn title(&mut self, text: impl Display) {
+        self.line(Emphasis::Bold, shortened(&text.to_string(), self.width()));
     }
 
-    /// Appends a sentence in lines of at most `width` characters, which break at spaces.
-    pub(crate) fn wrapped(&mut self, sentence: &str, width: usize) {
+    /// Appends whole lines without emphasis.
+    pub(crate) fn plain(&mut self, lines: impl Display) {
+        lines.to_string().lines().for_each(|line| self.line(Emphasis::None, line));
+    }
+
+    /// Appends a sentence in lines within the width, which break at spaces.
+    pub(crate) fn note(&mut self, sentence: impl Display) {
+        let sentence = sentence.to_string();
         let indent = " ".repeat(sentence.len() - sentence.trim_start().len());
         let mut line = indent.clone();
         for word in sentence.split_whitespace() {
             let is_first = line.len() == indent.len();
-            if !is_first && line.chars().count() + 1 + word.chars().count() > width {
+            if !is_first && line.chars().count() + 1 + word.chars().count() > self.width() {
                 self.line(Emphasis::None, &line);
-                line = format!("{indent}  {word}");
+                line = indent.clone() + "  " + word;
             } else {
                 line += if is_first { "" } else { " " };
                 line += word;

@@ -3,9 +3,7 @@
 /// Fields from which a task gets its name in a table.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct TaskName<'a> {
-    /// Instruction given to the policy.
     pub prompt: &'a str,
-    /// Asset of the object.
     pub asset: &'a str,
 }
 
@@ -24,7 +22,6 @@ pub(crate) fn task_names(tasks: &[TaskName]) -> Vec<String> {
     tasks.iter().map(name).collect()
 }
 
-/// An asset in words.
 pub(crate) fn object_name(asset: &str) -> String {
     asset.replace('_', " ")
 }

@@ -16,9 +16,7 @@ use softvt_evaluation::{
     statistics::{Distribution, Rate},
 };
 use softvt_runs::paired_tests::{DetectableDifference, MIN_DISCORDANT};
-use softvt_runs::summary::{
-    AbortedEpisode, CommandCounts, GroupScores, InvalidEpisode, SuiteSummary, TaskScores,
-};
+use softvt_runs::summary::{CommandCounts, FailedEpisode, GroupScores, SuiteSummary, TaskScores};
 
 /// Columns of a row of a task other than its name and, at the end, its categories.
 const NUMBERS_WIDTH: usize = 41;
@@ -36,30 +34,27 @@ const MAX_INVALID_LISTED: usize = 5;
 /// Largest number of aborted episodes listed.
 const MAX_ABORTED_LISTED: usize = 10;
 
-/// The results of one suite.
 pub fn table(summary: &SuiteSummary, format: TerminalFormat) -> String {
     let mut text = StyledText::new(format);
     let scores = &summary.scores;
     let episodes = counted(scores.episodes, "episode");
-    let title = format!("{} · {} · {episodes}", summary.suite, summary.method_label());
-    text.line(Emphasis::Bold, shortened(&title, format.width - 1));
-    push_categories(&mut text, scores, format.width - 1);
+    text.title(format_args!("{} · {} · {episodes}", summary.suite, summary.method_label()));
+    push_categories(&mut text, scores);
     text.end();
     push_rate(&mut text, "Goal", scores.goal_success_rate, EpisodeCategory::Safe).end();
     push_safety(&mut text, scores);
     text.end();
-    push_tasks(&mut text, summary, format);
-    push_metrics(&mut text, scores, format);
+    push_tasks(&mut text, summary);
+    push_metrics(&mut text, scores);
     if format.has_details {
         push_details(&mut text, summary);
     }
-    push_notes(&mut text, summary, format);
+    push_notes(&mut text, summary);
     text.into_text()
 }
 
-/// The number of episodes of each category that occurs, in lines of at most `width` characters. Rigid objects have no
-/// limit to be within.
-fn push_categories(text: &mut StyledText, scores: &GroupScores, width: usize) {
+/// The number of episodes of each category that occurs. Rigid objects have no limit to be within.
+fn push_categories(text: &mut StyledText, scores: &GroupScores) {
     let counts = EpisodeCategory::ALL.map(|category| (category, scores.count(category)));
     let mut length = 0;
     for (category, count) in counts.into_iter().filter(|(_, count)| *count > 0) {
@@ -72,7 +67,7 @@ fn push_categories(text: &mut StyledText, scores: &GroupScores, width: usize) {
             _ => String::new(),
         };
         let part = format!("{} {count} {name}{crushed}", category.glyph());
-        if length > 0 && length + 2 + part.chars().count() > width {
+        if length > 0 && length + 2 + part.chars().count() > text.width() {
             text.end();
             length = 0;
         }
@@ -91,13 +86,13 @@ fn push_rate<'a>(
     category: EpisodeCategory,
 ) -> &'a mut StyledText {
     let Some(value) = rate.rate else {
-        return text.push(Emphasis::None, format!("{name:<7} N/A"));
+        return text.push(Emphasis::None, format_args!("{name:<7} N/A"));
     };
     let bounds = rate.wilson95.map(|[low, high]| format!("[{low:>3.0}, {high:>3.0}]")).unwrap_or_default();
     let filled = (0.01 * value * BAR_WIDTH as f64).round() as usize;
     let [full, empty] = [("█", filled), ("░", BAR_WIDTH - filled.min(BAR_WIDTH))].map(|(c, n)| c.repeat(n));
-    text.push(Emphasis::Bold, format!("{name:<7}{value:>4.0} %"))
-        .push(Emphasis::None, format!("  {bounds}  "))
+    text.push(Emphasis::Bold, format_args!("{name:<7}{value:>4.0} %"))
+        .push(Emphasis::None, format_args!("  {bounds}  "))
         .push(Emphasis::Category(category), full)
         .push(Emphasis::Faint, empty)
 }
@@ -111,8 +106,8 @@ fn push_safety(text: &mut StyledText, scores: &GroupScores) {
         return text.line(Emphasis::None, "Safety  N/A  rigid objects have no limit of their deformation");
     }
     if scores.safety_success_rate.rate.is_none() {
-        let what = format!("Safety  N/A  not judged: {}", scores.not_judged);
-        return text.line(Emphasis::None, what);
+        let count = scores.not_judged;
+        return text.line(Emphasis::None, format_args!("Safety  N/A  not judged: {count}"));
     }
     push_rate(text, "Safety", scores.safety_success_rate, EpisodeCategory::Safe);
     let over = scores.count(EpisodeCategory::OverLimit);
@@ -124,12 +119,11 @@ fn push_safety(text: &mut StyledText, scores: &GroupScores) {
             crushed => format!("placed, {crushed} of {over} crushed"),
         };
         let category = Emphasis::Category(EpisodeCategory::OverLimit);
-        text.push(Emphasis::None, "  ").push(category, format!("gap {gap:.0} points: {harm}"));
+        text.push(Emphasis::None, "  ").push(category, format_args!("gap {gap:.0} points: {harm}"));
     }
     text.end();
 }
 
-/// A row of the table of tasks.
 struct TaskRow<'a> {
     number: String,
     name: &'a str,
@@ -137,7 +131,7 @@ struct TaskRow<'a> {
 }
 
 /// One line per task that has a failed episode, or per task with details, and one for all.
-fn push_tasks(text: &mut StyledText, summary: &SuiteSummary, format: TerminalFormat) {
+fn push_tasks(text: &mut StyledText, summary: &SuiteSummary) {
     let tasks = &summary.by_task;
     if tasks.is_empty() {
         return;
@@ -146,7 +140,7 @@ fn push_tasks(text: &mut StyledText, summary: &SuiteSummary, format: TerminalFor
         tasks.iter().map(|task| TaskName { prompt: &task.prompt, asset: &task.asset }).collect();
     let names = task_names(&named);
     let has_failed = |task: &TaskScores| task.scores.count(EpisodeCategory::Safe) < task.scores.episodes;
-    let is_shown = |task: &TaskScores| format.has_details || has_failed(task);
+    let is_shown = |task: &TaskScores| text.format.has_details || has_failed(task);
     let shown = tasks.iter().zip(&names).filter(|(task, _)| is_shown(task));
     let row = |(task, name)| {
         let TaskScores { task, scores, .. }: &TaskScores = task;
@@ -155,7 +149,7 @@ fn push_tasks(text: &mut StyledText, summary: &SuiteSummary, format: TerminalFor
     };
     let mut rows: Vec<TaskRow> = shown.map(row).collect();
     rows.push(TaskRow { number: String::new(), name: "all", scores: &summary.scores });
-    let lines = Table::new(&rows, task_columns(format)).lines();
+    let lines = Table::new(&rows, task_columns(text.format)).lines();
     text.line(Emphasis::Faint, &lines[0]);
     for (row, line) in rows.iter().zip(&lines[1..rows.len()]) {
         text.push(Emphasis::None, line).push(Emphasis::None, "  ");
@@ -166,8 +160,8 @@ fn push_tasks(text: &mut StyledText, summary: &SuiteSummary, format: TerminalFor
     if hidden > 0 {
         let others = if hidden < tasks.len() { "other " } else { "" };
         let what = if summary.scores.is_soft() { "without a failure" } else { "placed without a drop" };
-        let them = format!("    {} {what}; --details shows all", counted(hidden, &format!("{others}task")));
-        text.line(Emphasis::Faint, them);
+        let hidden = counted(hidden, &(others.to_owned() + "task"));
+        text.line(Emphasis::Faint, format_args!("    {hidden} {what}; --details shows all"));
     }
 }
 
@@ -217,14 +211,13 @@ fn push_failures(text: &mut StyledText, scores: &GroupScores) {
             (_, [single]) => format!("{} {}", scores.count(*single), single.name()),
             _ => scores.count(*category).to_string(),
         };
-        let part = format!("{} {what}", category.glyph());
+        let part = format_args!("{} {what}", category.glyph());
         text.push(Emphasis::None, gap).push(Emphasis::Category(*category), part);
     }
     text.end();
 }
 
-/// One line per metric of the suite.
-fn push_metrics(text: &mut StyledText, scores: &GroupScores, format: TerminalFormat) {
+fn push_metrics(text: &mut StyledText, scores: &GroupScores) {
     if scores.metrics.is_empty() {
         return;
     }
@@ -235,7 +228,7 @@ fn push_metrics(text: &mut StyledText, scores: &GroupScores, format: TerminalFor
         };
         Column::number(heading, cell).width(9)
     };
-    let width = format.width.saturating_sub(1 + 45).clamp(12, 40);
+    let width = text.width().saturating_sub(45).clamp(12, 40);
     let columns = [
         Column::text("metric", |metric: &(&String, &Distribution)| metric.0.clone()).width(width),
         number("mean", |of| of.mean),
@@ -250,86 +243,84 @@ fn push_metrics(text: &mut StyledText, scores: &GroupScores, format: TerminalFor
     }
 }
 
-fn push_notes(text: &mut StyledText, summary: &SuiteSummary, format: TerminalFormat) {
-    let (scores, width) = (&summary.scores, format.width - 1);
-    let mut note = |what: &str| text.wrapped(what, width);
-    if summary.no_slip_required {
-        note("Safety Success also requires no slip in the hand (criteria.require_no_slip)");
-    }
-    if summary.privileged {
-        note("privileged: it reads the true state, which no robot has");
-    }
-    if summary.replayed {
-        note("replayed: the actions are those of a recorded run");
-    }
-    if summary.force_observed {
-        note("force_observed: it reads the true forces at the pads, which no real sensor measures");
-    }
-    summary.attempt_notes().iter().for_each(|line| note(line));
-    command_notes(&summary.commands).iter().for_each(|line| note(line));
+fn push_notes(text: &mut StyledText, summary: &SuiteSummary) {
+    let scores = &summary.scores;
+    let mut note_if = |applies: bool, what: &str| {
+        if applies {
+            text.note(what);
+        }
+    };
+    let slip = "Safety Success also requires no slip in the hand (criteria.require_no_slip)";
+    note_if(summary.no_slip_required, slip);
+    note_if(summary.privileged, "privileged: it reads the true state, which no robot has");
+    note_if(summary.replayed, "replayed: the actions are those of a recorded run");
+    let forces = "force_observed: it reads the true forces at the pads, which no real sensor measures";
+    note_if(summary.force_observed, forces);
+    summary.attempt_notes().iter().for_each(|line| text.note(line));
+    push_command_notes(text, &summary.commands);
     for (name, _) in scores.metrics.iter().filter(|(_, values)| values.n == 0) {
-        note(&format!("metric {name} has no value in any valid episode: its function returned nil"));
+        text.note(format_args!("metric {name} has no value in any valid episode: its function returned nil"));
     }
     if scores.safety_unknown > 0 {
-        note(&format!(
+        text.note(format_args!(
             "safety could not be judged in {} (no threshold, or D not measured); counted as not safe",
             counted(scores.safety_unknown, "episode")
         ));
     }
     if scores.invalid > 0 {
-        note(&format!("{} counted as failed in every rate", counted(scores.invalid, "invalid episode")));
+        let invalid = counted(scores.invalid, "invalid episode");
+        text.note(format_args!("{invalid} counted as failed in every rate"));
     }
-    let invalid = &summary.invalid_episodes;
-    for InvalidEpisode { task, episode, reason } in invalid.iter().take(MAX_INVALID_LISTED) {
-        note(&shortened(&format!("  task {task} episode {episode}: invalid: {reason}"), width));
+    push_failed(text, &summary.invalid_episodes, "invalid: ", MAX_INVALID_LISTED);
+    if !summary.gave_up.is_empty() {
+        let episodes = counted(summary.gave_up.len(), "episode");
+        text.note(format_args!("{} gave up in {episodes}:", summary.policy));
     }
-    if invalid.len() > MAX_INVALID_LISTED {
-        note(&format!("  … and {} more, in summary.json", invalid.len() - MAX_INVALID_LISTED));
-    }
-    let aborted = &summary.gave_up;
-    if !aborted.is_empty() {
-        note(&format!("{} gave up in {}:", summary.policy, counted(aborted.len(), "episode")));
-    }
-    for AbortedEpisode { task, episode, reason } in aborted.iter().take(MAX_ABORTED_LISTED) {
-        note(&shortened(&format!("  task {task} episode {episode}: {reason}"), width));
-    }
-    if aborted.len() > MAX_ABORTED_LISTED {
-        note(&format!("  … and {} more, in summary.json", aborted.len() - MAX_ABORTED_LISTED));
-    }
-    note(&resolution(scores));
+    push_failed(text, &summary.gave_up, "", MAX_ABORTED_LISTED);
+    push_resolution(text, scores);
 }
 
-/// What the number of episodes can separate.
-fn resolution(scores: &GroupScores) -> String {
+/// A line for each of the first episodes of a list, and the number of the others.
+fn push_failed(text: &mut StyledText, episodes: &[FailedEpisode], failure: &str, most: usize) {
+    for FailedEpisode { task, episode, reason } in episodes.iter().take(most) {
+        text.note(shortened(&format!("  task {task} episode {episode}: {failure}{reason}"), text.width()));
+    }
+    if episodes.len() > most {
+        text.note(format_args!("  … and {} more, in summary.json", episodes.len() - most));
+    }
+}
+
+/// Smallest difference that this number of episodes can detect.
+fn push_resolution(text: &mut StyledText, scores: &GroupScores) {
     let rate = if scores.is_soft() { scores.safety_success_rate } else { scores.goal_success_rate };
     let n = scores.episodes;
     let wide = if n < FEW_EPISODES { format!("n = {n}: intervals are wide; ") } else { String::new() };
     match DetectableDifference::new(rate.count, n) {
         Some(DetectableDifference { smallest, .. }) => {
             let (episodes, points) = (counted(n, "episode"), significant(smallest, 2));
-            format!("{wide}{episodes} distinguish policies that differ by at least {points} points")
+            text.note(format_args!(
+                "{wide}{episodes} distinguish policies that differ by at least {points} points"
+            ));
         }
-        None => format!("{wide}distinguishing policies takes at least {MIN_DISCORDANT} episodes"),
+        None => {
+            text.note(format_args!("{wide}distinguishing policies takes at least {MIN_DISCORDANT} episodes"))
+        }
     }
 }
 
-/// Commands that were not executed as given.
-fn command_notes(commands: &CommandCounts) -> Vec<String> {
-    let of = |count: u64, what: &str, episodes: usize| {
-        format!("{count} of {} {what} in {}", commands.steps, counted(episodes, "episode"))
+/// Notes about commands that were not executed as given.
+fn push_command_notes(text: &mut StyledText, commands: &CommandCounts) {
+    let note = |text: &mut StyledText, count: u64, what: &str, episodes: usize, end: &str| {
+        if count > 0 {
+            let episodes = counted(episodes, "episode");
+            text.note(format_args!("{count} of {} {what} in {episodes}{end}", commands.steps));
+        }
     };
-    let mut notes = Vec::new();
-    if commands.far > 0 {
-        notes.push(of(commands.far, "commands were out of reach", commands.far_episodes));
-        notes.extend(commands.first_far.map(|first| format!("  first: {first}")));
+    note(text, commands.far, "commands were out of reach", commands.far_episodes, "");
+    if let Some(first) = commands.first_far {
+        text.note(format_args!("  first: {first}"));
     }
-    if commands.clamped_grips > 0 {
-        let grips = of(commands.clamped_grips, "grip values were out of range", commands.clamped_episodes);
-        notes.push(format!("{grips}; the hand clamped them"));
-    }
-    if commands.clamped_steps > 0 {
-        let what = "displacements were beyond −1..1, and clamped,";
-        notes.push(of(commands.clamped_steps, what, commands.clamped_step_episodes));
-    }
-    notes
+    let (grips, steps) = ("grip values were out of range", "displacements were beyond −1..1, and clamped,");
+    note(text, commands.clamped_grips, grips, commands.clamped_episodes, "; the hand clamped them");
+    note(text, commands.clamped_steps, steps, commands.clamped_step_episodes, "");
 }

@@ -32,11 +32,11 @@ const HAND_HALF: Vec3 = Vec3::new(0.0316, 0.1025, 0.033);
 
 /// Modified Denavit–Hartenberg parameters of a joint (Craig, Introduction to Robotics, 1986, §3.4).
 struct DenavitHartenberg {
-    /// m.
+    /// Length of the link, m.
     a: f64,
     /// α in quarter turns, which are exact.
     quarter_turns: f64,
-    /// m.
+    /// Offset along the joint axis, m.
     d: f64,
 }
 
@@ -56,13 +56,13 @@ const FLANGE_Z: f64 = 0.107;
 
 /// Limits of a joint.
 struct JointLimits {
-    /// rad.
+    /// Least angle, rad.
     lower: f64,
-    /// rad.
+    /// Largest angle, rad.
     upper: f64,
-    /// rad/s.
+    /// Largest speed, rad/s.
     speed: f64,
-    /// N m.
+    /// Largest torque, N m.
     torque: f64,
 }
 
@@ -79,9 +79,9 @@ const LIMITS: [JointLimits; ARM_DOFS] = [
 
 /// Mass properties of a link, in its link frame.
 struct LinkInertia {
-    /// kg.
+    /// Mass of the link, kg.
     mass: f64,
-    /// m.
+    /// Centre of mass, m.
     com: [f64; 3],
     /// xx, yy, zz, xy, xz, yz about the centre of mass, kg m².
     inertia: [f64; 6],
@@ -204,9 +204,9 @@ pub fn tree(base_w: Pose, gripper: &GripperSpec) -> JointTree {
 /// Range of an arm joint, rad.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct JointRange {
-    /// Lower limit.
+    /// Least angle, rad.
     pub lower: f64,
-    /// Upper limit.
+    /// Largest angle, rad.
     pub upper: f64,
 }
 

@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use super::PadSurface;
 use softvt_common::{
     range::{Range, RangeError},
-    settings::{Setting, SettingDeclaration, SettingField},
+    settings::{SettingDeclaration, SettingField, SettingValue, SettingVisitor},
 };
 use softvt_geometry::Vec3;
 
@@ -175,27 +175,19 @@ impl Default for MarkerModel {
 }
 
 impl SettingField for OpticsModel {
-    fn describe(&self, declaration: &SettingDeclaration<'_>, list: &mut Vec<Setting>) {
-        let values = "polynomial, or { model = \"taxim\", tables = folder }".to_owned();
-        list.push(declaration.setting("polynomial", values));
-    }
-
-    fn check_declared(&self, _: &SettingDeclaration<'_>) -> Result<(), RangeError> {
-        Ok(())
+    fn visit(&self, declaration: &SettingDeclaration<'_>, visitor: &mut SettingVisitor<'_>) {
+        let values = "polynomial, or { model = \"taxim\", tables = folder }";
+        visitor(declaration, SettingValue::Word { value: "polynomial", values });
     }
 }
 
 impl SettingField for MarkerModel {
-    fn describe(&self, declaration: &SettingDeclaration<'_>, list: &mut Vec<Setting>) {
-        let values = "elastic, or fots with the constants below".to_owned();
-        list.push(declaration.setting("elastic", values));
-        FotsSpec::default().describe(declaration, list);
-    }
-
-    fn check_declared(&self, declaration: &SettingDeclaration<'_>) -> Result<(), RangeError> {
+    fn visit(&self, declaration: &SettingDeclaration<'_>, visitor: &mut SettingVisitor<'_>) {
+        let values = "elastic, or fots with the constants below";
+        visitor(declaration, SettingValue::Word { value: "elastic", values });
         match self {
-            Self::Elastic {} => Ok(()),
-            Self::Fots(fots) => fots.check_declared(declaration),
+            Self::Elastic {} => FotsSpec::default().visit(declaration, visitor),
+            Self::Fots(fots) => fots.visit(declaration, visitor),
         }
     }
 }

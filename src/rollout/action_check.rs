@@ -40,32 +40,13 @@ fn joint_outside_limits(joints: ArmAngles) -> Option<JointOutsideLimits> {
 /// Largest magnitude of the numbers of an action, m and rad. The squares of larger ones may overflow.
 const MAX_ACTION: f64 = 1e6;
 
-/// An action cannot be executed. The text becomes the message of the outcome.
-#[derive(Debug, thiserror::Error)]
-pub(super) enum ActionError {
-    #[error("the action {0:?} holds a number that is not finite")]
-    NotFinite(Vec<f64>),
-    #[error("the action {action:?} holds {number:e}, which is not {expected}")]
-    Implausible { action: Vec<f64>, number: f64, expected: &'static str },
-    #[error(
-        "the action asks for a grip force of {force_n} N; expected 0 to {effort_n} N (robot.gripper.effort), or less \
-         than 0 to open"
-    )]
-    GripForce { force_n: f64, effort_n: f64 },
-    #[error(
-        "all {steps} commands were out of reach, first: {first}; expected {}",
-        match are_joints {
-            true => "joint positions in rad, within the limits of the joints and near the present ones",
-            false => "positions in m and axis-angles in rad, in the robot's base frame",
-        }
-    )]
-    OutOfReach { steps: u32, first: UnreachableCommand, are_joints: bool },
-}
-
 /// Checks that the numbers of an action are finite and plausible, and a grip force within the effort of the gripper.
-pub(super) fn check_action(action: &Action, effort_n: f64) -> Result<(), ActionError> {
+pub(super) fn check_action(action: &Action, effort_n: f64) -> Result<(), String> {
     if let Some(force_n) = action.force_n().filter(|force| !(0.0..=effort_n).contains(force)) {
-        return Err(ActionError::GripForce { force_n, effort_n });
+        return Err(format!(
+            "the action asks for a grip force of {force_n} N; expected 0 to {effort_n} N (robot.gripper.effort), or less \
+             than 0 to open"
+        ));
     }
     // The pose of joint positions follows from them.
     let numbers = || match action.joints {
@@ -73,7 +54,7 @@ pub(super) fn check_action(action: &Action, effort_n: f64) -> Result<(), ActionE
         None => action.to_array().to_vec(),
     };
     if !action.numbers().all(f64::is_finite) {
-        return Err(ActionError::NotFinite(numbers()));
+        return Err(format!("the action {:?} holds a number that is not finite", numbers()));
     }
     match action.numbers().find(|x| x.abs() > MAX_ACTION) {
         Some(number) => {
@@ -81,7 +62,7 @@ pub(super) fn check_action(action: &Action, effort_n: f64) -> Result<(), ActionE
                 Some(_) => "a joint position in rad",
                 None => "a pose in m and rad",
             };
-            Err(ActionError::Implausible { action: numbers(), number, expected })
+            Err(format!("the action {:?} holds {number:e}, which is not {expected}", numbers()))
         }
         None => Ok(()),
     }
@@ -96,7 +77,7 @@ mod tests {
     #[test]
     fn far_commands_are_accepted_and_implausible_ones_are_refused() {
         let action = |x| Action::new(Vec3::new(x, 0.0, 0.0), Vec3::zeros(), 0.0);
-        let refusal = |action: Action| check_action(&action, 70.0).map_err(|error| error.to_string());
+        let refusal = |action: Action| check_action(&action, 70.0);
         assert_eq!(refusal(action(-1e5)), Ok(()));
         assert!(refusal(action(1e308)).is_err_and(|error| error.contains("not a pose")));
         assert!(refusal(action(f64::NAN)).is_err_and(|error| error.contains("not finite")));
@@ -123,7 +104,7 @@ mod tests {
         let joint = far([0.0, 0.0, 0.0, -135.0, 0.0, 0.0, 0.0]).unwrap();
         assert_eq!(joint, "joint 4 at -137.4 rad, whose limits are -3.072 to -0.07 rad");
         assert!(far([1.5, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]).unwrap().contains("rad from the tool"));
-        let refusal = |x| check_action(&action([x; 7]), 70.0).map_err(|error| error.to_string());
+        let refusal = |x| check_action(&action([x; 7]), 70.0);
         assert_eq!(refusal(500.0), Ok(()));
         assert!(refusal(1e9).is_err_and(|error| error.contains("1e9, which is not a joint position in rad")));
         assert!(refusal(f64::NAN).is_err_and(|error| error.contains("not finite")));

@@ -38,7 +38,7 @@ const PIECES_RESOLUTION: usize = 24;
 /// A shape with what is derived from it. Values that take long are kept on disk.
 #[derive(Debug)]
 pub(super) struct DerivedShape {
-    shape: Shape,
+    pub(super) shape: Shape,
     disk: DiskCache,
     bounds: OnceLock<Aabb>,
     mass: OnceLock<MassProperties>,
@@ -83,8 +83,7 @@ impl DerivedShape {
         stored(&self.disk, kind, &self.shape, || compute(&self.shape))
     }
 
-    /// Tight bounds.
-    fn bounds(&self) -> Aabb {
+    pub(super) fn bounds(&self) -> Aabb {
         let search = || self.stored("bounds", Shape::bounds);
         *self.bounds.get_or_init(|| self.shape.closed_bounds().unwrap_or_else(search))
     }
@@ -239,12 +238,10 @@ impl AssetCache {
         Self { approximate: false, ..self.clone() }
     }
 
-    /// Tight bounds of a shape.
     pub fn bounds(&self, shape: &Shape) -> Aabb {
         shape.closed_bounds().unwrap_or_else(|| self.shape(shape).bounds())
     }
 
-    /// What is derived from a shape.
     pub(super) fn shape(&self, shape: &Shape) -> Arc<DerivedShape> {
         let CacheEntries { shapes, disk, .. } = &*self.entries;
         let new = || Ok::<_, Infallible>(Arc::new(DerivedShape::new(shape, disk)));
@@ -280,8 +277,8 @@ impl AssetCache {
                         && has_discretisation(known, declared)
                 },
                 || {
-                    SoftGeometry::stored(&asset.name, &nominal.shape, declared, approximate, disk)
-                        .map(Arc::new)
+                    let shape = self.shape(&nominal.shape);
+                    SoftGeometry::stored(&asset.name, &shape, declared, approximate, disk).map(Arc::new)
                 },
             )?;
             Ok(geometry.model(material, object.scale))
@@ -328,13 +325,11 @@ impl AssetCache {
         })
     }
 
-    /// Render meshes of the robot.
     pub(super) fn robot(&self) -> Result<Arc<RobotMeshes>, CameraError> {
         let CacheEntries { robot, disk, .. } = &*self.entries;
         robot.get(&(), |()| true, || Ok(Arc::new(RobotMeshes::new(disk)?)))
     }
 
-    /// Tactile sensor of a specification.
     pub(super) fn sensor(&self, spec: &TactileSpec) -> Result<Arc<TactileSensor>, SensingError> {
         self.entries.sensors.get(spec, |known| known == spec, || Ok(Arc::new(TactileSensor::new(spec)?)))
     }

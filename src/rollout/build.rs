@@ -16,32 +16,42 @@ use softvt_physics::{
     joints::{JointKind, JointTree, Link},
     rigid::RigidState,
 };
-use softvt_scene::{Asset, Body, JointMotion, MovingPart, Object, Scene};
+use softvt_scene::{Body, JointMotion, MovingPart, Object, Scene};
 
 /// Minimum thickness of rigid walls, m. Other bodies can pass through thinner ones between two steps.
 const MIN_WALL: f64 = 2e-3;
 /// Minimum length of the longest side of an object, m. Less is nearly always a wrong scale.
 const MIN_SIZE: f64 = 1e-3;
 
-fn check_scale(object: &Object, cache: &AssetCache) -> Result<(), SceneBuildError> {
-    let longest = cache.bounds(&object.asset.shape).size().max();
+/// Describes an object with a wrong scale, with more friction when it slides than when it rests, as layouts change both
+/// numbers separately, or with walls that other bodies may pass through.
+fn problem(object: &Object, cache: &AssetCache) -> Option<String> {
+    let (asset, longest) = (&object.asset, cache.bounds(&object.asset.shape).size().max());
     // Meshing reports an empty shape.
-    if longest >= MIN_SIZE || longest == 0.0 {
-        return Ok(());
+    if longest < MIN_SIZE && longest != 0.0 {
+        let least = format_number(MIN_SIZE);
+        return Some(format!(
+            "it is {longest:.1e} m long, expected at least {least} m; sizes are in metres (a mesh has a scale)"
+        ));
     }
-    let what = format!(
-        "it is {longest:.1e} m long, expected at least {} m; sizes are in metres (a mesh has a scale)",
-        format_number(MIN_SIZE)
-    );
-    Err(SceneBuildError::Material { asset: object.asset.name.clone(), what })
+    let Friction { static_mu, dynamic_mu, .. } = asset.friction;
+    if dynamic_mu > static_mu {
+        let [dynamic_mu, static_mu] = [dynamic_mu, static_mu].map(format_number);
+        return Some(format!(
+            "dynamic_mu is {dynamic_mu}, above static_mu, {static_mu}; set both, the larger one as static_mu"
+        ));
+    }
+    if !matches!(asset.body, Body::Rigid { .. }) {
+        return None;
+    }
+    let wall = cache.shape(&asset.shape).wall().filter(|wall| *wall < MIN_WALL)?;
+    Some(too_thin(&format!("it is about {} mm thick, or its walls are", tenths_of_mm(wall)), MIN_WALL))
 }
 
-/// The error about walls that are too thin for a minimum (m); `description` states how thick they are.
-fn thin_walls_error(object: &Object, description: &str, min: f64) -> SceneBuildError {
+/// The problem of walls thinner than `min` (m); `description` states how thick they are.
+fn too_thin(description: &str, min: f64) -> String {
     let min = format_number(1e3 * min);
-    let what =
-        format!("{description}, expected at least {min} mm: other bodies may pass through thinner ones");
-    SceneBuildError::Material { asset: object.asset.name.clone(), what }
+    format!("{description}, expected at least {min} mm: other bodies may pass through thinner ones")
 }
 
 /// Tolerated initial overlap, m. Contact forces resolve it while the objects settle.
@@ -126,20 +136,6 @@ pub(super) fn check_base(scene: &Scene) -> Result<(), SceneBuildError> {
     Ok(())
 }
 
-/// Checks that a surface that slides holds no better than one that rests, as layouts change both numbers separately.
-fn check_friction(asset: &Asset) -> Result<(), SceneBuildError> {
-    let Friction { static_mu, dynamic_mu, .. } = asset.friction;
-    if dynamic_mu <= static_mu {
-        return Ok(());
-    }
-    let what = format!(
-        "dynamic_mu is {}, above static_mu, {}; set both, the larger one as static_mu",
-        format_number(dynamic_mu),
-        format_number(static_mu)
-    );
-    Err(SceneBuildError::Material { asset: asset.name.clone(), what })
-}
-
 /// Adds an object with its parts to the world and to `instances`.
 fn add(
     world: &mut World,
@@ -148,13 +144,8 @@ fn add(
     instances: &mut Vec<ObjectInstance>,
 ) -> Result<(), SceneBuildError> {
     let asset = &object.asset;
-    check_scale(object, cache)?;
-    check_friction(asset)?;
-    if matches!(asset.body, Body::Rigid { .. })
-        && let Some(wall) = cache.shape(&asset.shape).wall().filter(|wall| *wall < MIN_WALL)
-    {
-        let description = format!("it is about {} mm thick, or its walls are", tenths_of_mm(wall));
-        return Err(thin_walls_error(object, &description, MIN_WALL));
+    if let Some(what) = problem(object, cache) {
+        return Err(SceneBuildError::Material { asset: asset.name.clone(), what });
     }
     let collider = |world: &World, parent: BodyId, pose_in_parent| {
         cache.shape(&asset.shape).collider(world, &object.name, parent, pose_in_parent, asset.friction)
@@ -219,8 +210,9 @@ fn add_articulated(
     for part in parts {
         if let Some(wall) = cache.shape(&part.asset.shape).wall() {
             let mm = tenths_of_mm(wall);
-            let description = format!("part {}: its walls are about {mm} mm thick", part.name);
-            return Err(thin_walls_error(object, &description, MIN_PART_WALL));
+            let what =
+                too_thin(&format!("part {}: its walls are about {mm} mm thick", part.name), MIN_PART_WALL);
+            return Err(SceneBuildError::Material { asset: object.asset.name.clone(), what });
         }
     }
     let links = parts.iter().map(|part| link(part, parts, cache)).collect();

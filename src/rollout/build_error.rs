@@ -6,104 +6,42 @@ use softvt_geometry::voxel::VoxelMeshError;
 use softvt_physics::{joints::JointTreeError, rigid::RigidError};
 use softvt_scene::Object;
 
-/// An object cannot be built.
+/// An object cannot be built. Lengths are in m. Places are `file:line`, empty if no script placed the object.
 #[derive(Debug, thiserror::Error)]
 pub enum SceneBuildError {
-    /// The shape cannot be meshed.
     #[error("asset {asset}: {source}")]
-    Geometry {
-        /// Asset name.
-        asset: String,
-        /// The cause.
-        source: VoxelMeshError,
-    },
-    /// The mass properties are invalid.
+    Geometry { asset: String, source: VoxelMeshError },
     #[error("asset {asset}: {source}")]
-    Rigid {
-        /// Asset name.
-        asset: String,
-        /// The cause.
-        source: RigidError,
-    },
-    /// A material parameter or a dimension is out of range.
+    Rigid { asset: String, source: RigidError },
     #[error("asset {asset}: {what}")]
-    Material {
-        /// Asset name.
-        asset: String,
-        /// The problem and the expected range.
-        what: String,
-    },
-    /// More nodes than can be simulated.
+    Material { asset: String, what: String },
     #[error("the soft bodies of the scene have {}", too_many(*.0))]
     Nodes(usize),
-    /// The joints do not form a valid tree.
     #[error("object {object}: {source}")]
-    Joints {
-        /// Object name.
-        object: String,
-        /// The cause.
-        source: JointTreeError,
-    },
-    /// Two objects overlap by more than contact allows.
+    Joints { object: String, source: JointTreeError },
     #[error(
         "objects {first} and {second}{} overlap by {} mm at the start; {}",
         placed(.second_at),
         tenths_of_mm(*.depth),
         overlap_remedy(.first, *.below_origin)
     )]
-    Overlap {
-        /// Name of the object that was placed last.
-        first: String,
-        /// Name of the other object.
-        second: String,
-        /// `file:line` of the other object; empty if no script placed it.
-        second_at: String,
-        /// Penetration depth, m.
-        depth: f64,
-        /// Distance from the origin of the first object to the lowest point of its shape, m, if
-        /// that explains the overlap.
-        below_origin: Option<f64>,
-    },
-    /// An object overlaps the base of the robot.
+    Overlap { first: String, second: String, second_at: String, depth: f64, below_origin: Option<f64> },
     #[error("object {0} starts inside of the robot's base; move it away")]
     InBase(String),
-    /// An object overlaps the hand of the robot.
     #[error(
         "object {object} starts inside of the robot's hand ({part}), {} mm deep; move it away, or the arm (scene.start_q)",
         tenths_of_mm(*.depth)
     )]
-    InRobot {
-        /// Object name.
-        object: String,
-        /// Collider of the hand.
-        part: String,
-        /// Penetration depth, m.
-        depth: f64,
-    },
-    /// An object would fall out of the world.
+    InRobot { object: String, part: String, depth: f64 },
     #[error(
         "object {object} at ({}, {}) m has nothing below it; place it above a support{}",
         format_number(*.x),
         format_number(*.y),
         if .x.hypot(*.y) > FAR { "; lengths are in metres" } else { "" }
     )]
-    NothingBelow {
-        /// Object name.
-        object: String,
-        /// Position in the world, m.
-        x: f64,
-        /// Position in the world, m.
-        y: f64,
-    },
-    /// An error about an object that a script placed.
+    NothingBelow { object: String, x: f64, y: f64 },
     #[error("{place}: {source}")]
-    At {
-        /// `file:line`.
-        place: String,
-        /// The cause.
-        source: Box<SceneBuildError>,
-    },
-    /// Two objects have the same name.
+    At { place: String, source: Box<SceneBuildError> },
     #[error("the scene has two objects named {0}; names must be unique")]
     DuplicateName(String),
 }

@@ -27,8 +27,8 @@ pub trait Controller {
     fn gave_up(&self) -> Option<&str> {
         None
     }
-    /// What to say about a controller that had not ended its task at the end of the budget, such as where it was.
-    /// `None` if it had ended, or has no end. Called once, after the last control step.
+    /// State of a controller that had not ended its task at the end of the budget, such as its last phase. `None` if it
+    /// had ended, or has no end. Called once, after the last control step.
     fn unended(&mut self) -> Option<String> {
         None
     }
@@ -37,14 +37,8 @@ pub trait Controller {
         BTreeMap::new()
     }
     /// Action of this control step, `None` to repeat the previous one.
-    ///
-    /// # Errors
-    /// [`PolicyError::Action`] ends the episode with the outcome `error`; any other error ends the run.
     fn act(&mut self, sim: &Simulation, observation: &Observation) -> Result<Option<Action>, PolicyError>;
     /// Called once after the last control step.
-    ///
-    /// # Errors
-    /// The earlier actions are not valid; the error ends the run.
     fn finish(&mut self) -> Result<(), PolicyError> {
         Ok(())
     }

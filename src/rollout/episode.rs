@@ -5,7 +5,7 @@ use std::{collections::BTreeMap, sync::Arc};
 use image::RgbImage;
 
 use super::{
-    action_check::{ActionError, check_action, far_command},
+    action_check::{check_action, far_command},
     asset_cache::AssetCache,
     controller::Controller,
     disturbance::Disturbance,
@@ -45,7 +45,7 @@ use softvt_policy::{Action, Observation, PolicyError, RobotState, SensorStreams}
 use softvt_robot::{Side, ik::ArmAngles, rotation};
 use softvt_runs::{
     actions,
-    record::{EpisodeHeader, EpisodeRecord, RolloutStats, UnreachableCommand},
+    record::{EpisodeHeader, EpisodeRecord, RolloutStats},
 };
 use softvt_scene::{Asset, Body, Camera, Scene};
 use softvt_sensing::{camera::RenderScene, tactile::TactileReading};
@@ -54,28 +54,22 @@ use softvt_sensing::{camera::RenderScene, tactile::TactileReading};
 /// is passed to [`Episode::run`](super::Episode::run).
 #[derive(Clone, Debug)]
 pub struct EpisodeSpec {
-    /// First columns of its record.
     pub header: EpisodeHeader,
-    /// The task.
     pub task: Task,
     /// The scene, before settling.
     pub scene: Arc<Scene>,
     /// Deformation limits of the soft objects by name in the scene; an object without one was never calibrated.
     pub limits: BTreeMap<String, DeformationLimit>,
-    /// Parameters of physics, robot, judge and sensors.
     pub settings: Settings,
     /// True to keep all states, from which images can be rendered after the episode.
     pub record_states: bool,
-    /// True to keep a trace.
     pub record_trace: bool,
     /// True if traces hold the node positions of soft bodies.
     pub trace_nodes: bool,
     /// Functions of the script that the goal asks for
     /// ([`Goal::Predicate`](softvt_benchmark::Goal::Predicate)), in the order of the goal.
     pub predicates: Vec<Arc<dyn StatePredicate>>,
-    /// Metrics of the suite.
     pub metrics: Vec<MeasuredMetric>,
-    /// Secret of a judged run.
     pub secret: Option<SecretSeed>,
 }
 
@@ -130,16 +124,13 @@ pub fn target_asset<'a>(scene: &'a Scene, task: &Task) -> Option<&'a Arc<Asset>>
     scene.objects.iter().find(|object| object.name == *name).map(|object| &object.asset)
 }
 
-/// Record and actions of a finished episode.
 #[derive(Debug)]
 pub struct FinishedEpisode {
-    /// The record.
     pub record: EpisodeRecord,
     /// One entry per control step, if requested.
     pub trace: Vec<StepTrace>,
     /// One entry per control step: the input of other scoring rules.
     pub scores: Vec<ControlStepScore>,
-    /// Action of each control step.
     pub actions: Vec<Action>,
     /// Joint positions that each action means, rad: those that it commands, or those of inverse kinematics when the
     /// robot responds to it, without a disturbance. Those of actions to which it no longer responds repeat the last.
@@ -148,7 +139,7 @@ pub struct FinishedEpisode {
     pub reference: Option<ReferenceShape>,
     /// States of the episode, if requested.
     pub recording: Option<StateRecording>,
-    /// What [`Controller::unended`] says, if the budget has ended the episode. Not a part of the record.
+    /// The text of [`Controller::unended`], if the budget has ended the episode. Not a part of the record.
     pub unended: Option<String>,
 }
 
@@ -160,21 +151,18 @@ pub struct FinishedEpisode {
 #[derive(Clone)]
 pub struct Episode {
     spec: EpisodeSpec,
-    /// Outcome, once the episode has ended.
     outcome: Option<Outcome>,
-    /// The simulation.
     pub sim: Simulation,
     evidence: EvidenceCollector,
     judge: Judge,
     target: usize,
     start_hold: Action,
-    steps: u32,
     physics_steps: u64,
-    newton: NewtonCount,
-    min_det_f: f64,
+    newton_steps: u64,
+    /// Counts and extremes so far.
+    stats: RolloutStats,
     /// In the order of the metrics.
     metric_values: Vec<MetricValues>,
-    /// The first error of a metric's function.
     metric_error: Option<String>,
     trace: Vec<StepTrace>,
     actions: Vec<Action>,
@@ -184,12 +172,7 @@ pub struct Episode {
     sensors: Sensors,
     history: ObservationHistory,
     recorded: Option<Vec<RecordedState>>,
-    /// Streams that will be requested.
     streams: SensorStreams,
-    far_commands: u32,
-    first_far_command: Option<UnreachableCommand>,
-    clamped_grips: u32,
-    clamped_steps: u32,
 }
 
 /// A state that is kept for the recording.
@@ -198,14 +181,6 @@ struct RecordedState {
     frame: WorldSnapshot,
     robot: RobotState,
     stage: Option<TaskStage>,
-}
-
-/// Number of Newton steps so far.
-#[derive(Clone, Copy, Default)]
-struct NewtonCount {
-    total: u64,
-    /// Maximum in one physics step.
-    max: u32,
 }
 
 impl Episode {
@@ -255,10 +230,9 @@ impl Episode {
             judge,
             target,
             start_hold,
-            steps: 0,
             physics_steps: 0,
-            newton: NewtonCount::default(),
-            min_det_f: f64::INFINITY,
+            newton_steps: 0,
+            stats: RolloutStats::default(),
             metric_values,
             metric_error: None,
             trace: Vec::new(),
@@ -269,10 +243,6 @@ impl Episode {
             history: ObservationHistory::default(),
             recorded,
             streams: SensorStreams::default(),
-            far_commands: 0,
-            first_far_command: None,
-            clamped_grips: 0,
-            clamped_steps: 0,
             outcome: None,
         })
     }
@@ -287,11 +257,8 @@ impl Episode {
         self.run_watched(controller, &mut |_| Ok(()))
     }
 
-    /// As [`run`](Self::run), and calls `watch` in the settled state and after each control step. What it calls must
-    /// not change the state; [`PolicyError::Interrupted`] ends the run.
-    ///
-    /// # Errors
-    /// As [`run`](Self::run), and those of `watch`.
+    /// As [`run`](Self::run), and calls `watch` in the settled state and after each control step. `watch` must not
+    /// change the state; [`PolicyError::Interrupted`] ends the run.
     pub fn run_watched(
         mut self,
         controller: &mut dyn Controller,
@@ -323,7 +290,8 @@ impl Episode {
             watch(&mut self).map_err(|source| self.control_error(source))?;
         }
         // A controller that has given up commands nothing more; its last command stays.
-        let is_far = matches!(self.outcome, Some(Outcome::Error { .. })) && self.far_commands == self.steps;
+        let is_far = matches!(self.outcome, Some(Outcome::Error { .. }))
+            && self.stats.far_commands == self.stats.steps;
         if is_far && controller.gave_up().is_some() {
             self.outcome = Some(Outcome::Budget);
         }
@@ -351,22 +319,21 @@ impl Episode {
         self.outcome.as_ref()
     }
 
-    /// The outcome, once the episode has ended.
     pub fn outcome(&self) -> Option<&Outcome> {
         self.outcome.as_ref()
     }
 
     fn advance(&mut self, action: &Action) -> Option<Outcome> {
-        if let Err(error) = check_action(action, self.spec.settings.robot.gripper.effort) {
-            return Some(Outcome::Error { message: error.to_string() });
+        if let Err(message) = check_action(action, self.spec.settings.robot.gripper.effort) {
+            return Some(Outcome::Error { message });
         }
         self.actions.push(*action);
         if let Some(far) = far_command(&self.sim.robot.tool_b(&self.sim.world), action) {
-            self.far_commands += 1;
-            self.first_far_command.get_or_insert(far);
+            self.stats.far_commands += 1;
+            self.stats.first_far_command.get_or_insert(far);
         }
-        self.clamped_grips += u32::from((action.closure() - 0.5).abs() > 0.5 + CLOSURE_ROUNDING);
-        self.clamped_steps += u32::from(action.is_clamped);
+        self.stats.clamped_grips += u32::from((action.closure() - 0.5).abs() > 0.5 + CLOSURE_ROUNDING);
+        self.stats.clamped_steps += u32::from(action.is_clamped);
         if let Err(outcome) = self.control_step(action) {
             return Some(outcome);
         }
@@ -379,14 +346,22 @@ impl Episode {
         if self.judge.is_goal_reached() {
             return Some(Outcome::Completed);
         }
-        if self.steps < self.spec.task.budget_steps {
+        let stats = &self.stats;
+        if stats.steps < self.spec.task.budget_steps {
             return None;
         }
-        match self.first_far_command.filter(|_| self.far_commands == self.steps) {
+        match stats.first_far_command.filter(|_| stats.far_commands == stats.steps) {
             Some(first) => {
-                let are_joints = self.actions.last().is_some_and(|action| action.joints.is_some());
-                let error = ActionError::OutOfReach { steps: self.steps, first, are_joints };
-                Some(Outcome::Error { message: error.to_string() })
+                let expected = match self.actions.last().is_some_and(|action| action.joints.is_some()) {
+                    true => {
+                        "joint positions in rad, within the limits of the joints and near the present ones"
+                    }
+                    false => "positions in m and axis-angles in rad, in the robot's base frame",
+                };
+                let steps = stats.steps;
+                let message =
+                    format!("all {steps} commands were out of reach, first: {first}; expected {expected}");
+                Some(Outcome::Error { message })
             }
             None => Some(Outcome::Budget),
         }
@@ -397,19 +372,12 @@ impl Episode {
     }
 
     /// The current observation with the requested streams.
-    ///
-    /// # Errors
-    /// A sensor stream cannot be computed.
     pub fn observe(&mut self, streams: &SensorStreams) -> Result<Observation, EpisodeError> {
         let proprioceptive = Observation {
             time_s: self.time(),
             robot: self.sim.robot.state(&self.sim.world, self.sensors.seed()),
             prompt: self.spec.task.prompt.clone(),
-            cameras: Vec::new(),
-            past: Vec::new(),
-            tactile: None,
-            forces: None,
-            force_history: Vec::new(),
+            ..Observation::default()
         };
         let observation = self.history.observe(&mut self.sensors, proprioceptive, streams);
         observation.map_err(|source| self.spec.sense_error(source))
@@ -438,15 +406,10 @@ impl Episode {
         Ok(image.into_rgb_image())
     }
 
-    /// The meshes that images are drawn from.
-    ///
-    /// # Errors
-    /// As [`Sensors::render_scene`].
     pub fn render_scene(&mut self) -> Result<&RenderScene, SensingError> {
         self.sensors.render_scene()
     }
 
-    /// The specification of the episode.
     pub fn spec(&self) -> &EpisodeSpec {
         &self.spec
     }
@@ -474,17 +437,11 @@ impl Episode {
     }
 
     /// Renders the current tactile image of a finger. It does not change the record.
-    ///
-    /// # Errors
-    /// As [`Sensors::tactile_reading`].
     pub fn render_tactile(&mut self, side: Side) -> Result<RgbImage, SensingError> {
         Ok(self.tactile_reading(side)?.image)
     }
 
     /// The present reading of a tactile sensor. It does not change the record.
-    ///
-    /// # Errors
-    /// As [`Sensors::tactile_reading`].
     pub fn tactile_reading(&mut self, side: Side) -> Result<TactileReading, SensingError> {
         self.sensors.tactile_reading(&Sensors::frame(&self.sim), side)
     }
@@ -506,24 +463,21 @@ impl Episode {
         self.physics_steps as f64 * self.spec.settings.physics.dt
     }
 
-    /// Executes an action for one control step.
-    ///
-    /// # Errors
-    /// The outcome, if physics or a function of the goal fails.
     fn control_step(&mut self, action: &Action) -> Result<(), Outcome> {
         let (pose_b, joints) = (action.pose_b(), action.joints);
         let arm = ArmCommand { pose_b, executed_b: self.disturbance.apply(&pose_b), joints };
         self.joint_commands.extend(self.sim.robot.command(&mut self.sim.world, arm, action.grip));
-        self.steps += 1;
+        self.stats.steps += 1;
         let physics_steps = steps_per_control(self.spec.settings.physics.dt);
         for step in 1..=physics_steps {
             self.physics_steps += 1;
             self.sim.step().map_err(|failure| self.invalid(&failure))?;
-            let stats = self.sim.world.solver_stats();
-            self.newton.total += u64::from(stats.newton_steps);
-            self.newton.max = self.newton.max.max(stats.max_newton_steps);
+            let (solver, stats) = (self.sim.world.solver_stats(), &mut self.stats);
+            self.newton_steps += u64::from(solver.newton_steps);
+            stats.newton_max = stats.newton_max.max(solver.max_newton_steps);
             if let BodyId::Soft(index) = self.sim.objects[self.target].body {
-                self.min_det_f = self.min_det_f.min(self.sim.world.soft(index).state.min_det_f().det_f);
+                let det_f = self.sim.world.soft(index).state.min_det_f().det_f;
+                stats.min_det_f = Some(stats.min_det_f.unwrap_or(f64::INFINITY).min(det_f));
             }
             let time = self.time();
             let evidence = self.evidence.collect(&self.sim, time, step == physics_steps);
@@ -575,26 +529,16 @@ impl Episode {
             &self.sim,
             &self.evidence,
             self.target,
-            self.steps,
+            self.stats.steps,
             self.time(),
             dropped,
             self.spec.trace_nodes,
         )
     }
 
-    /// Number of commands so far that were out of reach.
-    pub fn far_commands(&self) -> u32 {
-        self.far_commands
-    }
-
-    /// Number of grip values so far that were out of range.
-    pub fn clamped_grips(&self) -> u32 {
-        self.clamped_grips
-    }
-
-    /// Number of displacements so far that were out of range.
-    pub fn clamped_steps(&self) -> u32 {
-        self.clamped_steps
+    /// Counts of commands so far.
+    pub fn stats(&self) -> &RolloutStats {
+        &self.stats
     }
 
     /// The first error of a metric's function since the last call; the metric has no value of that step.
@@ -610,25 +554,17 @@ impl Episode {
 
     /// The record so far. `gave_up` is the reason why the controller aborted, if it did.
     pub fn record(&self, gave_up: Option<String>) -> EpisodeRecord {
-        let soft = matches!(self.sim.objects[self.target].body, BodyId::Soft(_));
         let stats = RolloutStats {
-            steps: self.steps,
             time_s: self.time(),
-            min_det_f: (soft && self.min_det_f.is_finite()).then_some(self.min_det_f),
-            newton_mean: self.newton.total as f64 / self.physics_steps.max(1) as f64,
-            newton_max: self.newton.max,
+            min_det_f: self.stats.min_det_f.filter(|det_f| det_f.is_finite()),
+            newton_mean: self.newton_steps as f64 / self.physics_steps.max(1) as f64,
             force_observed: self.streams.force,
             camera_inside: self.history.camera_inside,
-            far_commands: self.far_commands,
-            first_far_command: self.first_far_command,
-            clamped_grips: self.clamped_grips,
-            clamped_steps: self.clamped_steps,
-            attempts: None,
             gave_up,
-            notes: BTreeMap::new(),
             metrics: self.metrics(),
             actions_sha256: actions::sha256(&self.actions),
             state_hash: state_hash(&self.sim),
+            ..self.stats.clone()
         };
         let outcome = self.outcome.clone().unwrap_or(Outcome::Budget);
         EpisodeRecord { header: self.spec.header.clone(), outcome, verdict: self.verdict(), stats }
@@ -670,18 +606,18 @@ impl Episode {
     }
 }
 
-/// Rounding error of a closure.
 const CLOSURE_ROUNDING: f64 = 1e-6;
 
 /// The judge of an episode, for its settled state.
 fn settled_judge(spec: &EpisodeSpec, sim: &Simulation, evidence: &EvidenceCollector) -> Judge {
+    let [targets, others] = evidence.settled(sim, &spec.limits);
     Judge::new(JudgeConfig {
         criteria: spec.settings.criteria.clone(),
         workspace: spec.scene.workspace,
         goal: evidence.goal().goal.clone(),
         predicates: evidence.goal().judged(),
-        targets: evidence.settled_targets(sim, &spec.limits),
-        others: evidence.other_bodies(sim, &spec.limits),
+        targets,
+        others,
         dt_s: spec.settings.physics.dt,
         steps_per_control: steps_per_control(spec.settings.physics.dt),
         max_steps: spec.task.budget_steps as usize * steps_per_control(spec.settings.physics.dt) as usize,

@@ -14,7 +14,7 @@ use softvt_evaluation::{
         PredicateEvidence, TargetEvidence,
     },
     goal::GoalRegion,
-    judge::{OtherBody, Target},
+    judge::JudgedBody,
     safety::DeformationLimit,
 };
 use softvt_geometry::{Pose, Vec3};
@@ -35,7 +35,6 @@ pub(super) struct EvidenceCollector {
     support_share: f64,
     /// Force above which the robot touches an object, N.
     touch_force_n: f64,
-    /// Movable objects that are not targets.
     others: Vec<usize>,
     references: Vec<Option<ReferenceShape>>,
     /// Deformation of each object in the last evidence; `None` if it is rigid or cannot be measured.
@@ -76,45 +75,26 @@ impl EvidenceCollector {
         }
     }
 
-    /// The targets as they settled, with their deformation limits by name.
-    pub(super) fn settled_targets(
+    /// The targets and the other movable objects as they settled, with their deformation limits by name.
+    pub(super) fn settled(
         &self,
         sim: &Simulation,
         limits: &BTreeMap<String, DeformationLimit>,
-    ) -> Vec<Target> {
-        let target = |&index: &usize| {
+    ) -> [Vec<JudgedBody>; 2] {
+        let body = |&index: &usize| {
             let object = &sim.objects[index];
-            Target {
+            JudgedBody {
                 name: object.name.clone(),
                 weight_n: sim.weight(object),
                 is_soft: matches!(object.body, BodyId::Soft(_)),
-                limit: limits.get(&object.name).copied(),
-                lowest_z_w: lowest(sim, object),
-            }
-        };
-        self.goal.targets.iter().map(target).collect()
-    }
-
-    /// The other movable objects as they settled, with their deformation limits by name.
-    pub(super) fn other_bodies(
-        &self,
-        sim: &Simulation,
-        limits: &BTreeMap<String, DeformationLimit>,
-    ) -> Vec<OtherBody> {
-        let other = |&index: &usize| {
-            let object = &sim.objects[index];
-            OtherBody {
-                name: object.name.clone(),
                 is_goal: self.goal.is_place(index),
-                is_soft: matches!(object.body, BodyId::Soft(_)),
                 limit: limits.get(&object.name).copied(),
                 lowest_z_w: lowest(sim, object),
             }
         };
-        self.others.iter().map(other).collect()
+        [&self.goal.targets, &self.others].map(|indices| indices.iter().map(body).collect())
     }
 
-    /// The goal.
     pub(super) fn goal(&self) -> &GoalInScene {
         &self.goal
     }
@@ -124,16 +104,12 @@ impl EvidenceCollector {
         self.deformations[object]
     }
 
-    /// Settled shape of an object.
     pub(super) fn reference(&self, object: usize) -> Option<&ReferenceShape> {
         self.references[object].as_ref()
     }
 
     /// The evidence of the last physics step. Predicates that are not placements are evaluated in the last physics
     /// step of a control step.
-    ///
-    /// # Errors
-    /// A function of the script fails.
     pub(super) fn collect<'a>(
         &'a mut self,
         sim: &Simulation,
@@ -281,7 +257,6 @@ fn strain_meter(sim: &Simulation, object: &ObjectInstance) -> Option<StrainMeter
     }
 }
 
-/// Deformation of each object from its reference.
 fn deformations<'a>(
     references: &'a [Option<ReferenceShape>],
     sim: &'a Simulation,

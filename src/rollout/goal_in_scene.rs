@@ -24,9 +24,6 @@ use softvt_scene::Joint;
 /// A function of the true state that a goal asks for ([`Goal::Predicate`]).
 pub trait StatePredicate: Debug + Send + Sync {
     /// True if it holds.
-    ///
-    /// # Errors
-    /// The function fails; the message names its place.
     fn holds(&self, sim: &Simulation, time_s: f64) -> Result<bool, String>;
 }
 
@@ -35,9 +32,7 @@ pub trait StatePredicate: Debug + Send + Sync {
 pub(super) struct GoalInScene {
     /// Indices of the objects that the task moves; the first is *the object*.
     pub targets: Vec<usize>,
-    /// How the predicates combine.
     pub goal: GoalNode,
-    /// The predicates, by number.
     pub predicates: Vec<PredicateInScene>,
     /// Functions of the script, which some predicates call.
     functions: Vec<Arc<dyn StatePredicate>>,
@@ -54,7 +49,6 @@ pub(super) struct PredicateInScene {
     is_negated: bool,
 }
 
-/// Subject of a predicate.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Subject {
     /// A target (a place in [`GoalInScene::targets`]) rests in a region of an object.
@@ -71,7 +65,6 @@ pub(super) enum Subject {
     Function(usize),
 }
 
-/// Builds a [`GoalInScene`].
 struct Finder<'a> {
     task: &'a Task,
     sim: &'a Simulation,
@@ -82,10 +75,6 @@ struct Finder<'a> {
 impl GoalInScene {
     /// The goal of a task. The scene need not have settled. `functions` are those of its
     /// [`Goal::Predicate`]s, in order.
-    ///
-    /// # Errors
-    /// The goal names an unknown object, a container without a cavity or something without a joint, or gravity
-    /// does not point down.
     pub(super) fn find(
         task: &Task,
         sim: &Simulation,
@@ -135,8 +124,8 @@ impl GoalInScene {
         self.predicates.iter().any(|p| matches!(p.subject, Subject::Rests { on, .. } if on == object))
     }
 
-    /// Whether a predicate that is not a placement holds. `is_touched` says of an object whether the robot presses on
-    /// it, which does not matter to negated predicates.
+    /// True if a predicate holds; placements have another function. `is_touched` says of an object whether the robot
+    /// presses on it, which does not matter to negated predicates.
     pub(super) fn holds(
         &self,
         predicate: usize,
@@ -182,12 +171,6 @@ impl GoalInScene {
                 }
             },
         })
-    }
-
-    /// Which predicates are known to hold in a scene that need not have settled: not those of objects at rest.
-    fn known_to_hold(&self, sim: &Simulation) -> Vec<bool> {
-        let holds = |number| self.holds(number, sim, 0.0, |_| false).unwrap_or(false);
-        (0..self.predicates.len()).map(holds).collect()
     }
 
     /// True if the goal may hold once the scene has settled. A conjunction may if each object is over its region, at
@@ -245,10 +228,7 @@ impl Finder<'_> {
             Goal::Closed { joint, share } => {
                 (0.0, self.joint(joint, |[low, high]| [low, low + share * (high - low)])?)
             }
-            Goal::Turned { joint, range } => {
-                self.check_range(joint, *range)?;
-                (0.0, self.joint(joint, |_| *range)?)
-            }
+            Goal::Turned { joint, range } => (0.0, self.joint(joint, |_| *range)?),
             Goal::Predicate { .. } => {
                 let before = |p: &&PredicateInScene| matches!(p.subject, Subject::Function(_));
                 (0.0, Subject::Function(self.found.predicates.iter().filter(before).count()))
@@ -277,37 +257,24 @@ impl Finder<'_> {
         Ok(Subject::Rests { target, on, region })
     }
 
-    /// The part of a name and the limits of its joint.
-    fn part(&self, name: &str) -> Result<(usize, [f64; 2]), EpisodeError> {
-        let part = self.index_of("joint", name)?;
-        let joint = self.sim.objects[part].part.as_ref().map(|part| &part.joint);
-        let joint = joint.filter(|_| matches!(self.sim.objects[part].body, BodyId::Link(_)));
-        let limits = joint.map(|joint| [joint.lower, joint.upper]).ok_or_else(|| {
-            let placed_at = placed_at(&self.sim.scene, name);
-            EpisodeError::NoJoint { task: self.task.id, name: name.to_owned(), placed_at }
-        })?;
-        Ok((part, limits))
-    }
-
-    /// Checks that a joint can be within a range.
-    fn check_range(&self, name: &str, [low, high]: [f64; 2]) -> Result<(), EpisodeError> {
-        let (_, [lower, upper]) = self.part(name)?;
-        if low <= upper && high >= lower {
-            return Ok(());
-        }
-        let placed_at = placed_at(&self.sim.scene, name);
-        Err(EpisodeError::JointRange { task: self.task.id, name: name.to_owned(), lower, upper, placed_at })
-    }
-
     /// The subject for a joint in the range that `range` derives from its limits. A range that includes a limit
     /// is open at it.
     fn joint(&self, name: &str, range: impl Fn([f64; 2]) -> [f64; 2]) -> Result<Subject, EpisodeError> {
-        let (part, limits) = self.part(name)?;
-        let [low, high] = range(limits);
+        let part = self.index_of("joint", name)?;
+        let (task, name) = (self.task.id, name.to_owned());
+        let placed_at = placed_at(&self.sim.scene, &name);
+        let joint = self.sim.objects[part].part.as_ref().map(|part| &part.joint);
+        let Some(joint) = joint.filter(|_| matches!(self.sim.objects[part].body, BodyId::Link(_))) else {
+            return Err(EpisodeError::NoJoint { task, name, placed_at });
+        };
+        let (lower, upper) = (joint.lower, joint.upper);
+        let [low, high] = range([lower, upper]);
+        if low > upper + Joint::TOLERANCE || high < lower - Joint::TOLERANCE {
+            return Err(EpisodeError::JointRange { task, name, lower, upper, placed_at });
+        }
         // A joint that presses on its stop is a little beyond its limit.
-        let low =
-            if low <= limits[0] + Joint::TOLERANCE { f64::NEG_INFINITY } else { low - Joint::TOLERANCE };
-        let high = if high >= limits[1] - Joint::TOLERANCE { f64::INFINITY } else { high + Joint::TOLERANCE };
+        let low = if low <= lower + Joint::TOLERANCE { f64::NEG_INFINITY } else { low - Joint::TOLERANCE };
+        let high = if high >= upper - Joint::TOLERANCE { f64::INFINITY } else { high + Joint::TOLERANCE };
         Ok(Subject::Joint { part, range: [low, high] })
     }
 }
@@ -321,7 +288,7 @@ fn is_conjunction(goal: &GoalNode) -> bool {
     }
 }
 
-/// What is known of a goal before its scene has settled.
+/// Knowledge of a goal before its scene has settled.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct GoalAtStart {
     /// True if the goal may hold once the scene has settled.
@@ -342,7 +309,10 @@ pub fn check_goal(
     functions: &[Arc<dyn StatePredicate>],
 ) -> Result<GoalAtStart, EpisodeError> {
     let goal = GoalInScene::find(task, sim, cache, functions)?;
-    let step = first_step_held(&task.goal, &goal.goal, &goal.known_to_hold(sim));
+    // Objects at rest are not known before they have settled.
+    let holds = |number| goal.holds(number, sim, 0.0, |_| false).unwrap_or(false);
+    let known: Vec<bool> = (0..goal.predicates.len()).map(holds).collect();
+    let step = first_step_held(&task.goal, &goal.goal, &known);
     Ok(GoalAtStart { may_hold: goal.may_hold(sim), held_step: step.map(Goal::describe) })
 }
 

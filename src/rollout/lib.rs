@@ -68,7 +68,7 @@
 //! assert_eq!(finished.record.stats.steps, 3);
 //! # Ok::<(), softvt_rollout::EpisodeError>(())
 //! ```
-#![warn(missing_docs, unreachable_pub)]
+#![warn(unreachable_pub)]
 
 mod action_check;
 mod asset_cache;
@@ -100,7 +100,7 @@ pub use episode::{Episode, EpisodeSpec, FinishedEpisode, target_asset};
 pub use episode_error::EpisodeError;
 pub use goal_in_scene::{GoalAtStart, StatePredicate, check_goal};
 pub use metric::{MeasuredMetric, StateFunction};
-pub use plausibility::{asset_warnings, friction_warnings, scene_warnings};
+pub use plausibility::{asset_warnings, ineffective_friction, scene_warnings};
 pub use robot_instance::{ArmCommand, RobotInstance};
 pub use sensor_noise::SensorSeed;
 pub use sensors::{

@@ -8,22 +8,16 @@ use softvt_benchmark::metric::{Metric, Reduction};
 /// A function of the true state after a control step.
 pub trait StateFunction: Debug + Send + Sync {
     /// Its value; `None` where it has none.
-    ///
-    /// # Errors
-    /// The function fails; the message names its place.
     fn value(&self, sim: &Simulation, step: &StepTrace) -> Result<Option<f64>, String>;
 }
 
-/// A metric with its function.
 #[derive(Clone, Debug)]
 pub struct MeasuredMetric {
-    /// Name and reduction.
     pub metric: Metric,
     /// The function that is called after each control step.
     pub function: Arc<dyn StateFunction>,
 }
 
-/// The values of a metric so far.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct MetricValues {
     count: u32,

@@ -23,13 +23,10 @@ use softvt_robot::{
 /// by differential inverse kinematics.
 #[derive(Clone, Debug)]
 pub struct RobotInstance {
-    /// Parameters with which it was built.
     pub spec: RobotSpec,
-    /// Articulation in the world.
     pub articulation: ArticulationId,
     /// Colliders of the left and right gel pad.
     pub pads: [ColliderId; 2],
-    /// All other colliders of the robot.
     pub body: Vec<ColliderId>,
     /// Pose of the base, world.
     pub base_w: Pose,
@@ -42,7 +39,7 @@ pub struct RobotInstance {
     delayed: VecDeque<DelayedCommand>,
 }
 
-/// Where the arm should be at the end of a control step.
+/// Pose or joint positions of the arm at the end of a control step, as commanded.
 #[derive(Clone, Copy, Debug)]
 pub struct ArmCommand {
     /// Commanded pose of the tool, base frame.

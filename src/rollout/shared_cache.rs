@@ -17,7 +17,6 @@ type Entries<K, V> = Vec<(K, CacheSlot<V>)>;
 #[derive(Debug)]
 pub(super) struct SharedCache<K, V> {
     entries: Mutex<Entries<K, V>>,
-    /// Maximum number of entries.
     most: usize,
 }
 
@@ -29,9 +28,6 @@ impl<K: Clone, V: Clone> SharedCache<K, V> {
 
     /// Returns the value whose key satisfies `is_same`, or computes and stores the value of `key`. Concurrent callers
     /// with an equal key block until the first has computed it (single flight); callers with other keys proceed.
-    ///
-    /// # Errors
-    /// Propagates the error of `compute`; nothing is cached, so the next call retries.
     pub(super) fn get<E>(
         &self,
         key: &K,

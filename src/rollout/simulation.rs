@@ -12,8 +12,7 @@ use super::{
     settled_box::{SettledBox, lean},
 };
 use softvt_benchmark::CONTROL_DT;
-use softvt_common::cancel;
-use softvt_common::text::hex;
+use softvt_common::{cancel, text::hex};
 use softvt_geometry::{Aabb, Pose, Vec3};
 use softvt_physics::{
     BodyId, ColliderId, ContactPartner, PhysicsParams, World,
@@ -34,14 +33,11 @@ const SETTLE_TIMEOUT: f64 = 3.0;
 /// Drop below all fixed objects from which on an object counts as fallen out of the world, m.
 const MIN_FALL: f64 = 0.5;
 
-/// A part of an articulated object.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ArticulatedPart {
     /// Index of the whole object in [`Simulation::objects`](super::Simulation::objects).
     pub object: usize,
-    /// Name within the object.
     pub name: String,
-    /// Joint between the part and its parent.
     pub joint: Joint,
 }
 
@@ -50,15 +46,12 @@ pub struct ArticulatedPart {
 pub struct ObjectInstance {
     /// Name in the scene; for a part `object.part`.
     pub name: String,
-    /// Shape, material and appearance.
     pub asset: Arc<Asset>,
-    /// Body in the world.
     pub body: BodyId,
     /// Initial pose of the object frame, world.
     pub start_w: Pose,
     /// Colliders of the body; none for a soft body.
     pub colliders: Vec<ColliderId>,
-    /// Finite-element model of a soft body.
     pub model: Option<Arc<FemModel>>,
     /// Bounds of the shape at rest, object frame. For a part: that of the whole object with all joints at 0.
     pub bounds: Aabb,
@@ -84,46 +77,23 @@ impl ObjectInstance {
     }
 }
 
-/// The scene did not come to rest.
+/// The scene did not come to rest. Places are `file:line`, empty if no script placed the object.
 #[derive(Debug, thiserror::Error)]
 pub enum SettleError {
-    /// An object still moves.
     #[error(
         "object {object} still moves at {speed_mm:.1} mm/s after {SETTLE_TIMEOUT} s of settling; put it nearer to what \
          it rests on, or make it lie stably"
     )]
-    Moving {
-        /// Object that moves fastest.
-        object: String,
-        /// Its speed, mm/s.
-        speed_mm: f64,
-        /// `file:line` where the object was placed; empty if no script placed it.
-        placed_at: String,
-    },
-    /// An object fell below all fixed objects.
+    Moving { object: String, speed_mm: f64, placed_at: String },
     #[error(
         "object {object} fell out of the world: there was nothing below it, and after {SETTLE_TIMEOUT} s of settling it is \
          {fallen:.1} m lower; place it above a support"
     )]
-    Fell {
-        /// Object that fell out of the scene.
-        object: String,
-        /// Distance that it has fallen, m.
-        fallen: f64,
-        /// `file:line` where the object was placed; empty if no script placed it.
-        placed_at: String,
-    },
-    /// The run was cancelled.
+    Fell { object: String, fallen: f64, placed_at: String },
     #[error("interrupted")]
     Interrupted,
-    /// A physics step failed.
     #[error("settling failed: {failure}")]
-    Failed {
-        /// Failure of the physics step.
-        failure: StepFailure,
-        /// `file:line` where the failing object was placed; empty if unknown.
-        placed_at: String,
-    },
+    Failed { failure: StepFailure, placed_at: String },
 }
 
 impl SettleError {
@@ -145,11 +115,8 @@ impl SettleError {
 /// give bitwise equal states.
 #[derive(Clone, Debug)]
 pub struct Simulation {
-    /// The scene from which it was built.
     pub scene: Arc<Scene>,
-    /// Bodies, joints and contacts.
     pub world: World,
-    /// The robot and its controller.
     pub robot: RobotInstance,
     /// Objects in the order of the scene, each followed by its parts.
     pub objects: Vec<ObjectInstance>,
@@ -174,8 +141,6 @@ impl Simulation {
         Ok(Self { scene, world, robot, objects })
     }
 
-    /// Advances by one physics step.
-    ///
     /// # Errors
     /// The solver failed; the state is no longer valid.
     pub fn step(&mut self) -> Result<(), StepFailure> {
@@ -293,7 +258,6 @@ impl Simulation {
         self.robot.pads.map(|pad| self.contact(object, ContactPartner::Collider(pad)))
     }
 
-    /// Friction between the pads and an object.
     pub fn pad_friction(&self, object: &ObjectInstance) -> Friction {
         let pad = &self.world.collider(self.robot.pads[0]).friction;
         match object.body {
@@ -318,7 +282,6 @@ impl Simulation {
         self.robot.pads.map(|pad| normal_force(&self.world.patch(pad), is_of_object))
     }
 
-    /// The object of a name.
     pub fn object(&self, name: &str) -> Option<&ObjectInstance> {
         self.objects.iter().find(|o| o.name == name)
     }
@@ -342,7 +305,6 @@ impl Simulation {
         self.world.mass(object.body).map_or(0.0, |mass| mass * self.scene.gravity.norm())
     }
 
-    /// Parts of the object of an index.
     pub fn parts(&self, index: usize) -> impl Iterator<Item = (&ObjectInstance, &ArticulatedPart)> {
         let parts = self.objects.iter().filter_map(|object| Some((object, object.part.as_ref()?)));
         parts.filter(move |(_, part)| part.object == index)

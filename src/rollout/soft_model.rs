@@ -4,15 +4,15 @@ use std::sync::Arc;
 
 use serde::{Deserialize, Serialize};
 
-use super::build_error::SceneBuildError;
-use softvt_common::disk_cache::DiskCache;
-use softvt_common::text::format_number;
+use super::{asset_cache::DerivedShape, build_error::SceneBuildError};
+use softvt_common::{disk_cache::DiskCache, text::format_number};
 use softvt_geometry::{
+    Aabb, Vec3,
     mass::{approximate_mass_properties, mass_properties},
     pieces::SeparatePieces,
     samples::{SampleSpec, surface_samples},
     shape::Shape,
-    voxel::{SurfaceSample, VoxelMesh, VoxelSpec, voxel_mesh},
+    voxel::{SurfaceSample, VoxelMesh, VoxelSpec, voxel_mesh_within},
 };
 use softvt_physics::{World, fem::FemModel};
 use softvt_scene::SoftMaterial;
@@ -53,15 +53,12 @@ pub fn cost_warning(world: &World) -> Option<String> {
 }
 
 /// Builds the finite-element model of a soft body. `name` identifies the asset in error messages.
-///
-/// # Errors
-/// The shape cannot be meshed.
 pub fn soft_model(
     name: &str,
     shape: &Shape,
     material: &SoftMaterial,
 ) -> Result<Arc<FemModel>, SceneBuildError> {
-    Ok(SoftGeometry::new(name, shape, material, false)?.model(material, 1.0))
+    Ok(SoftGeometry::new(name, shape, &shape.bounds(), material, false)?.model(material, 1.0))
 }
 
 /// Discretised shape of a soft body: the part of its model that depends on neither elasticity nor density.
@@ -69,7 +66,7 @@ pub fn soft_model(
 pub(super) struct SoftGeometry {
     mesh: VoxelMesh,
     samples: Vec<SurfaceSample>,
-    /// m³.
+    /// Volume of the shape, m³.
     volume: f64,
 }
 
@@ -77,37 +74,47 @@ impl SoftGeometry {
     /// As [`SoftGeometry::new`], kept in `disk`.
     pub(super) fn stored(
         name: &str,
-        shape: &Shape,
+        shape: &DerivedShape,
         material: &SoftMaterial,
         approximate: bool,
         disk: &DiskCache,
     ) -> Result<Self, SceneBuildError> {
-        let inputs = (shape, material.resolution, material.grasp_spacing, approximate);
-        disk.get("voxels", &inputs, || Self::new(name, shape, material, approximate))
+        let inputs = (&shape.shape, material.resolution, material.grasp_spacing, approximate);
+        disk.get("voxels", &inputs, || Self::new(name, &shape.shape, &shape.bounds(), material, approximate))
     }
 
-    /// Meshes a shape. An `approximate` geometry has fewer contact samples and an approximate volume.
+    /// Meshes a shape within its tight bounds. An `approximate` geometry has fewer contact samples and an approximate
+    /// volume.
     pub(super) fn new(
         name: &str,
         shape: &Shape,
+        bounds: &Aabb,
         material: &SoftMaterial,
         approximate: bool,
     ) -> Result<Self, SceneBuildError> {
-        check_size(name, shape, material)?;
-        check_thickness(name, shape, material)?;
+        let refused = |what| SceneBuildError::Material { asset: name.to_owned(), what };
+        if let Some(what) = size_problem(&bounds.size(), material) {
+            return Err(refused(what));
+        }
         let (grasp_spacing, volume) = match approximate {
             true => {
                 (APPROXIMATE_SPACING * material.grasp_spacing, approximate_mass_properties(shape, 1.0).mass)
             }
             false => (material.grasp_spacing, mass_properties(shape, 1.0).mass),
         };
-        let mesh = voxel_mesh(shape, &VoxelSpec { resolution: material.resolution })
+        let mesh = voxel_mesh_within(shape, bounds, &VoxelSpec { resolution: material.resolution })
             .map_err(|source| SceneBuildError::Geometry { asset: name.to_owned(), source })?;
         if mesh.nodes.len() > MAX_NODES {
-            let what = format!("its voxel mesh has {}", too_many(mesh.nodes.len()));
-            return Err(SceneBuildError::Material { asset: name.to_owned(), what });
+            return Err(refused(format!("its voxel mesh has {}", too_many(mesh.nodes.len()))));
         }
-        check_connected(name, &mesh)?;
+        // D of several pieces would measure how they move apart.
+        if let Some(SeparatePieces { count, gap }) = SeparatePieces::find(&mesh) {
+            return Err(refused(format!(
+                "its voxel mesh has {count} separate pieces, {:.1} mm apart; join them, give a higher resolution if the shape is \
+                 connected, or make each an asset of its own",
+                1e3 * gap
+            )));
+        }
         let samples = surface_samples(shape, &mesh, &SampleSpec { grasp_spacing, ..SampleSpec::default() });
         Ok(Self { mesh, samples, volume })
     }
@@ -124,66 +131,42 @@ impl SoftGeometry {
     }
 }
 
-/// Checks that a body is one piece: D of several would measure how they move apart.
-fn check_connected(name: &str, mesh: &VoxelMesh) -> Result<(), SceneBuildError> {
-    let Some(SeparatePieces { count, gap }) = SeparatePieces::find(mesh) else { return Ok(()) };
-    let what = format!(
-        "its voxel mesh has {count} separate pieces, {:.1} mm apart; join them, give a higher resolution if the shape is \
-         connected, or make each an asset of its own",
-        1e3 * gap
-    );
-    Err(SceneBuildError::Material { asset: name.to_owned(), what })
-}
-
 /// Maximum number of contact samples of one body. More take minutes to compute; nearly always the size
 /// was given in millimetres.
 const MAX_SAMPLES: f64 = 1e6;
 
-fn check_size(name: &str, shape: &Shape, material: &SoftMaterial) -> Result<(), SceneBuildError> {
-    let size = shape.bounds().size();
+/// Describes a body with too many contact samples, or thinner than a voxel, which may have no elements at all.
+fn size_problem(size: &Vec3, material: &SoftMaterial) -> Option<String> {
     let samples =
         2.0 * (size.x * size.y + size.y * size.z + size.z * size.x) / material.grasp_spacing.powi(2);
-    if samples <= MAX_SAMPLES {
-        return Ok(());
+    if samples > MAX_SAMPLES {
+        let [x, y, z] = [size.x, size.y, size.z].map(format_number);
+        return Some(format!(
+            "it is {x} × {y} × {z} m, about {samples:.0e} contact samples {} mm apart, expected at most {MAX_SAMPLES:.0e}; \
+             sizes are in metres; a truly large body needs a larger grasp_spacing",
+            1e3 * material.grasp_spacing
+        ));
     }
-    let what = format!(
-        "it is {} × {} × {} m, about {samples:.0e} contact samples {} mm apart, expected at most {MAX_SAMPLES:.0e}; \
-         sizes are in metres; a truly large body needs a larger grasp_spacing",
-        format_number(size.x),
-        format_number(size.y),
-        format_number(size.z),
-        1e3 * material.grasp_spacing
-    );
-    Err(SceneBuildError::Material { asset: name.to_owned(), what })
-}
-
-/// Checks that a body is at least a voxel thick. A thinner one may have no elements at all.
-fn check_thickness(name: &str, shape: &Shape, material: &SoftMaterial) -> Result<(), SceneBuildError> {
-    let size = shape.bounds().size();
-    let (thin, long) = (size.min(), size.max());
-    let edge = long / material.resolution.max(1) as f64;
+    let (thin, long, resolution) = (size.min(), size.max(), material.resolution);
+    let edge = long / resolution.max(1) as f64;
     // The slack is for a size that is a whole number of voxels.
     if !(thin > 0.0 && thin < edge * (1.0 - 1e-6)) {
-        return Ok(());
+        return None;
     }
     let mm = |metres: f64| format_number((1e5 * metres).round() / 100.0);
-    let needed = (long / thin * (1.0 - 1e-6)).ceil();
-    let fix = if needed <= SoftMaterial::MAX_RESOLUTION as f64 {
-        format!("give resolution = {needed}")
-    } else {
-        let least = mm(long / SoftMaterial::MAX_RESOLUTION as f64);
-        format!(
-            "no resolution up to {} is fine enough; make it at least {least} mm thick",
-            SoftMaterial::MAX_RESOLUTION
-        )
+    let (needed, most) = ((long / thin * (1.0 - 1e-6)).ceil(), SoftMaterial::MAX_RESOLUTION);
+    let fix = match needed <= most as f64 {
+        true => format!("give resolution = {needed}"),
+        false => format!(
+            "no resolution up to {most} is fine enough; make it at least {} mm thick",
+            mm(long / most as f64)
+        ),
     };
-    let what = format!(
-        "it is {} mm thick, thinner than a voxel: at resolution {} they are {} mm; {fix}",
+    Some(format!(
+        "it is {} mm thick, thinner than a voxel: at resolution {resolution} they are {} mm; {fix}",
         mm(thin),
-        material.resolution,
         mm(edge)
-    );
-    Err(SceneBuildError::Material { asset: name.to_owned(), what })
+    ))
 }
 
 #[cfg(test)]
@@ -209,7 +192,7 @@ mod tests {
     /// D (%) and force per pad (N) of the ball at `scale`, pressed between two plates to `share` of its diameter.
     fn press(scale: f64, share: f64) -> (f64, f64) {
         let (shape, material) = ball();
-        let geometry = SoftGeometry::new("ball", &shape, &material, false).expect("meshed");
+        let geometry = SoftGeometry::new("ball", &shape, &shape.bounds(), &material, false).expect("meshed");
         let model = geometry.model(&material, scale);
         let mut world = World::new(PhysicsParams::default(), Vec3::zeros());
         let body = world.add_soft("ball", model.clone(), None, &Pose::identity(), Friction::default());
@@ -233,7 +216,7 @@ mod tests {
     #[test]
     fn a_scaled_body_has_the_voxels_of_the_nominal_one_and_the_cube_of_its_mass() {
         let (shape, material) = ball();
-        let geometry = SoftGeometry::new("ball", &shape, &material, false).expect("meshed");
+        let geometry = SoftGeometry::new("ball", &shape, &shape.bounds(), &material, false).expect("meshed");
         let [nominal, scaled] = [1.0, 1.12].map(|scale| geometry.model(&material, scale));
         assert_eq!(nominal.mesh.elements, scaled.mesh.elements);
         assert_eq!(nominal.mesh.occupancy, scaled.mesh.occupancy);

@@ -33,7 +33,6 @@ pub struct StepTrace {
     pub dropped: bool,
     /// Kinetic, elastic and potential energy, J.
     pub energy_j: [f64; 3],
-    /// Newton iterations of the last physics step.
     pub newton: u32,
     /// All movable objects, in the order of the scene.
     pub objects: Vec<ObjectTrace>,
@@ -42,7 +41,6 @@ pub struct StepTrace {
 /// State of an object after a control step.
 #[derive(Clone, Debug, Serialize)]
 pub struct ObjectTrace {
-    /// Name of the object in the scene.
     pub name: String,
     /// Position of its frame, m, world.
     pub position_w: [f64; 3],
@@ -52,7 +50,6 @@ pub struct ObjectTrace {
     pub d_pct: Option<f64>,
     /// Minimum determinant of the deformation gradient; null for a rigid object.
     pub min_det_f: Option<f64>,
-    /// True if the body sleeps.
     pub asleep: bool,
     /// Normal force of the left and right pad on it, N.
     pub pad_force_n: [f64; 2],

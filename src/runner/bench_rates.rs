@@ -16,7 +16,7 @@ use softvt_common::{
     episode_id::{EpisodeId, EpisodeSplit},
     parallel,
     table::{Column, Table},
-    text::decimal,
+    text::{counted, decimal},
 };
 use softvt_policy::{Action, Observation, PolicyError, SensorStreams};
 use softvt_rollout::{AssetCache, Controller, Episode, EpisodeSpec, Simulation};
@@ -25,13 +25,11 @@ use softvt_script::{EpisodeSetup, ExpertController, ExpertGrip, LoadedScript, Sc
 
 /// Number of episodes of which the fastest counts: other work on the machine only makes them slower.
 const EPISODES: usize = 5;
-/// What an observation holds, in the order of [`MachineRates::streams`].
+/// Contents of an observation, in the order of [`MachineRates::streams`].
 const STREAMS: [&str; 4] = ["state", "state, cameras", "state, touch", "all streams"];
 
-/// Rates of one machine.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct MachineRates {
-    /// Version of softvt.
     pub softvt: String,
     /// Suite whose first task is run.
     pub script: String,
@@ -51,14 +49,14 @@ pub struct MachineRates {
 }
 
 impl MachineRates {
-    /// These rates beside published ones as text, one column for each machine.
+    /// These rates and published ones as text, one column for each machine.
     pub fn table_beside(&self, published: &Self) -> String {
         let here = self;
         let row = |name: &str, value: &dyn Fn(&MachineRates) -> String| {
             [name.to_owned(), value(here), value(published)]
         };
         let mut rows = vec![
-            row("CPU s to the first observation", &|rates| format!("{:.2}", rates.first_observation_s)),
+            row("CPU s to the first observation", &|rates| decimal(Some(rates.first_observation_s), 2)),
             row("the same with the cache", &|rates| decimal(rates.cached_first_observation_s, 2)),
         ];
         for (index, of_streams) in here.streams.iter().enumerate() {
@@ -70,9 +68,7 @@ impl MachineRates {
             rows.push(row(&format!("{}, one core", of_streams.streams), &value));
         }
         let machine = |rates: &MachineRates| {
-            let threads =
-                if rates.threads == 1 { "1 thread".to_owned() } else { format!("{} threads", rates.threads) };
-            format!("{:.0} ({threads})", rates.observations_per_s)
+            format!("{:.0} ({})", rates.observations_per_s, counted(rates.threads, "thread"))
         };
         rows.push(row("all streams, machine", &machine));
         let names = [("here", here), ("published", published)]
@@ -91,7 +87,6 @@ impl MachineRates {
 /// Rate of observations with some of the streams, on one thread.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct StreamRate {
-    /// What an observation holds.
     pub streams: String,
     /// Observations per second of CPU time.
     pub observations_per_s: f64,
@@ -170,7 +165,6 @@ pub(crate) fn all_streams() -> SensorStreams {
     streams_of(STREAMS.len() - 1)
 }
 
-/// The streams of a row of [`STREAMS`].
 fn streams_of(row: usize) -> SensorStreams {
     let cameras = STANDARD_CAMERAS.map(str::to_owned).into();
     match row {
@@ -181,9 +175,7 @@ fn streams_of(row: usize) -> SensorStreams {
     }
 }
 
-/// Duration of an episode.
 pub(crate) struct EpisodeTiming {
-    /// Control steps.
     steps: f64,
     /// CPU time before the first action, s.
     until_action_s: f64,
@@ -244,7 +236,6 @@ pub(crate) fn time_episode(
     })
 }
 
-/// The suite of a script.
 pub(crate) fn suite_of(loaded: &LoadedScript) -> Result<&Suite, RunError> {
     match &loaded.plan {
         Plan::Suite(suite) => Ok(suite),

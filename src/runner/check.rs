@@ -1,6 +1,6 @@
 //! [`SuiteChecker`]: the scenes of the first episodes and the limits of a suite, without an episode.
 
-use std::{collections::BTreeSet, path::PathBuf, sync::Mutex};
+use std::{collections::BTreeSet, sync::Mutex};
 
 use crate::{
     config::{ConfiguredScript, RunConfig},
@@ -12,6 +12,7 @@ use crate::{
 use softvt_benchmark::{ObjectType, Suite, Task};
 use softvt_common::{
     cancel,
+    episode_id::EpisodeSplit,
     parallel::{self, lock},
 };
 use softvt_geometry::Aabb;
@@ -47,7 +48,7 @@ impl<'a> SuiteChecker<'a> {
         let none = EpisodeList::listed(Vec::new());
         let run = SuiteRun {
             assets: self.script.sources.assets.approximate(),
-            ..SuiteRun::new(self.config, self.script, suite, none, PathBuf::new())?
+            ..SuiteRun::new(self.config, self.script, suite, none, EpisodeSplit::Validation)?
         };
         let jobs = EpisodeList::of_tasks(&tasks, episodes, None);
         let CheckedScenes { warnings, scenes } = check_scenes(&run, &jobs)?;
@@ -128,7 +129,7 @@ fn check_scenes(run: &SuiteRun, jobs: &EpisodeList) -> Result<CheckedScenes, Run
         let setup = run.open_episode(&run.episode_id(task, episode))?;
         let judges_soft = run.suite.object_type != ObjectType::Rigid && !run.config.rigid_twin;
         let mut warnings = scene_warnings(task, &setup.scene, judges_soft, &run.assets);
-        warnings.extend(run.friction_warnings(&setup));
+        warnings.extend(run.ineffective_friction(&setup));
         warnings.extend(setup.unusual_numbers());
         let has_changed = setup.is_shifted();
         let of_scene = run.check_scene(task, episode, setup.scene.clone(), setup.predicates)?;

@@ -17,7 +17,7 @@ use crate::{
     suite_selection::{check_episodes, path_component, select_episodes, select_tasks},
 };
 use softvt_benchmark::{Condition, ObjectType, Plan, REFERENCE, Suite, Task, settings::Settings};
-use softvt_common::{files::replace, text};
+use softvt_common::{episode_id::EpisodeSplit, files, text};
 use softvt_report::condition_table::{ConditionOutcome, ConditionRow, ConditionTable};
 use softvt_runs::{
     run_folder::RunFolder,
@@ -67,7 +67,7 @@ pub fn run<E: From<RunError>>(
         tables.push(compared);
         on_suite(&tables)?;
     }
-    replace(&out.join(FILE), format!("{:#}\n", document(run, &tables))).map_err(RunError::from)?;
+    files::write_json(&out.join(FILE), &document(run, &tables)).map_err(RunError::from)?;
     Ok(tables)
 }
 
@@ -95,10 +95,6 @@ pub fn check(run: &ConfiguredScript) -> Result<(), RunError> {
     Ok(())
 }
 
-/// The cases of each suite.
-///
-/// # Errors
-/// A condition that does not fit a suite, or that changes none.
 fn cases_of_suites(
     config: &RunConfig,
     suites: &[Suite],
@@ -109,7 +105,7 @@ fn cases_of_suites(
     // The reference is the first.
     for (at, condition) in (1..).zip(conditions) {
         if cases.iter().all(|cases| cases[at].is_neutral) {
-            return Err(config.error(format!(
+            return Err(config.error(format_args!(
                 "the condition {:?} sets what {} without it; leave it out, or give other values",
                 condition.name,
                 if suites.len() == 1 { "the suite has" } else { "the suites have" }
@@ -143,18 +139,28 @@ fn condition_cases(
     for condition in std::iter::once(&reference).chain(conditions) {
         let folder = format!("{parent}{}", path_component(&condition.name));
         if let Some(same) = cases.iter().find(|case| case.folder == folder) {
-            return Err(config.error(format!(
+            return Err(config.error(format_args!(
                 "the conditions {:?} and {:?} share the folder {folder}; rename one",
                 same.condition.name, condition.name
             )));
         }
-        check_shared_changes(config, condition)?;
+        // A change by the run would not hold in a condition that sets the same.
+        let shifts = config.shifts.iter().map(|shift| ("shifts", &shift.name, shift.value.to_string()));
+        let settings = config.settings.iter().map(|(path, value)| ("settings", path, value.clone()));
+        let is_set = |name: &String| {
+            let mut shifts = condition.shift.iter().map(|shift| &shift.name);
+            shifts.any(|own| own == name) || condition.set.iter().any(|(own, _)| own == name)
+        };
+        if let Some((field, name, value)) = shifts.chain(settings).find(|(_, name, _)| is_set(name)) {
+            let message = format!("condition {:?} sets it too; leave it out", condition.name);
+            return Err(config.error_of(field, format!("{name}={value}"), message));
+        }
         let mut changed = config.clone();
         changed.shifts.extend(condition.shift.iter().cloned());
         changed.settings.extend(condition.set.iter().cloned());
         if let Some(name) = &condition.policy {
             changed.policy = PolicyConfig::named(name)
-                .map_err(|error| config.error(format!("condition {:?}: {error}", condition.name)))?;
+                .map_err(|error| config.error(format_args!("condition {:?}: {error}", condition.name)))?;
         }
         if condition.rigid_twin {
             changed.rigid_twin = true;
@@ -164,7 +170,7 @@ fn condition_cases(
         if not_applicable.is_none() && suite.settings.with_all(&config.settings).is_ok() {
             suite.settings.with_all(&changed.settings).map_err(|error| {
                 let place = format!("suite {}, condition {:?}", suite.name, condition.name);
-                config.error(format!("set: {error}")).within(&place)
+                config.error(format_args!("set: {error}")).within(&place)
             })?;
         }
         let is_neutral = condition.name != REFERENCE
@@ -179,23 +185,7 @@ fn condition_cases(
     Ok(cases)
 }
 
-/// Checks that a condition sets nothing that the command line sets: it would not hold in that condition.
-fn check_shared_changes(config: &RunConfig, condition: &Condition) -> Result<(), RunError> {
-    let sets = |name: &str| {
-        condition.shift.iter().any(|own| own.name == name) || condition.set.iter().any(|(own, _)| own == name)
-    };
-    let shifts = config.shifts.iter().map(|shift| ("shifts", &shift.name, shift.value.to_string()));
-    let settings = config.settings.iter().map(|(path, value)| ("settings", path, value.clone()));
-    match shifts.chain(settings).find(|(_, name, _)| sets(name)) {
-        None => Ok(()),
-        Some((field, name, value)) => {
-            let message = format!("the condition {:?} sets it as well; leave it out", condition.name);
-            Err(config.error_of(field, format!("{name}={value}"), message))
-        }
-    }
-}
-
-/// What the changes of a configuration make of a suite.
+/// Values that a configuration changes in a suite.
 #[derive(PartialEq)]
 struct Effect<'a> {
     /// The shifts that differ from their defaults; of one that is given twice, the last value.
@@ -252,7 +242,9 @@ fn prepare_runs<'a>(
             RunFolder::check_vacant(&dir).map_err(|error| case.config.error(error))?;
         }
         let jobs = select_episodes(&case.config, suite, tasks);
-        let run = SuiteRun::new(&case.config, loaded, suite, jobs, dir).map_err(in_case)?;
+        let run =
+            SuiteRun::new(&case.config, loaded, suite, jobs, EpisodeSplit::Validation).map_err(in_case)?;
+        let run = SuiteRun { out: Some(dir), ..run };
         let prepared = match runs.first() {
             Some(Some(reference)) => run.prepare_like(reference),
             _ => run.prepare(),
@@ -275,7 +267,7 @@ fn compare_conditions(
         let mut outcome = None;
         if let Some(run) = run {
             let (name, number) = (text::escape_control(&case.condition.name), rows.len() + 1);
-            config.notice(format!("{}, {name} ({number} of {})", suite.name, cases.len()));
+            config.notice(format_args!("{}, {name} ({number} of {})", suite.name, cases.len()));
             let result = run_suite(&run, &mut |_| ())?;
             outcome = Some(ConditionOutcome::new(case.folder.clone(), &result.records, reference.as_deref()));
             reference.get_or_insert(result.records);
@@ -299,7 +291,6 @@ fn compare_conditions(
     Ok(ConditionTable { suite: config.suite_name(suite), policy, deformable, rows })
 }
 
-/// The content of `conditions.json`.
 pub fn document(
     ConfiguredScript { config, script: loaded }: &ConfiguredScript,
     tables: &[ConditionTable],

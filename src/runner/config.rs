@@ -47,7 +47,6 @@ impl FromStr for TraceDetail {
     }
 }
 
-/// A configuration and its script.
 pub struct ConfiguredScript {
     /// The configuration from which the script was loaded.
     pub config: RunConfig,
@@ -90,9 +89,7 @@ pub struct RunConfig {
     pub options: Vec<String>,
     /// Base seed of a run without a secret; [`RunConfig::base_seed`] is that of every run.
     pub seed: u64,
-    /// Secret of a judged run.
     pub secret: Option<SecretSeed>,
-    /// Shifts by name and value.
     pub shifts: Vec<ShiftValue>,
     /// Changed settings by path and value.
     pub settings: Vec<(String, String)>,
@@ -100,7 +97,6 @@ pub struct RunConfig {
     pub rigid_twin: bool,
     /// File with the ranges within which the episodes vary, in place of those of the suite.
     pub vary: Option<PathBuf>,
-    /// Policy that controls the robot.
     pub policy: PolicyConfig,
     /// Indices or parts of prompts of the tasks to run; all if empty.
     pub tasks: Vec<String>,
@@ -118,13 +114,14 @@ pub struct RunConfig {
     pub video: Option<EpisodeFilter>,
     /// Episodes that become MCAP files.
     pub mcap: Option<EpisodeFilter>,
-    /// Folder of the results. Without one, a [`Runner`](super::Runner) writes nothing.
+    /// Folder of the results; by default nothing is written.
     pub out: Option<PathBuf>,
+    /// True to write into the next folder `runs/SUITE-POLICY-NNN` if there is no output folder.
+    pub is_numbered: bool,
     /// True to continue an interrupted run in the output folder.
     pub resume: bool,
     /// Scripts of a stored run, which are used in place of those on the disk.
     pub stored_scripts: Option<Arc<StoredScripts>>,
-    /// Receiver of progress and messages.
     pub observer: Arc<dyn Observer>,
 }
 
@@ -149,6 +146,7 @@ impl Default for RunConfig {
             video: None,
             mcap: None,
             out: None,
+            is_numbered: false,
             resume: false,
             stored_scripts: None,
             observer: Arc::new(SilentObserver),
@@ -162,7 +160,6 @@ impl RunConfig {
         Self { file: file.into(), ..Self::default() }
     }
 
-    /// This configuration with another policy.
     pub fn with_policy(self, policy: PolicyConfig) -> Self {
         Self { policy, ..self }
     }
@@ -210,9 +207,6 @@ impl RunConfig {
 
     /// Checks that the part `read` of the configuration is all that differs from the defaults. `user` names what reads
     /// it, as messages do.
-    ///
-    /// # Errors
-    /// A field without effect.
     pub fn check_read(&self, read: &Self, user: impl fmt::Display) -> Result<(), RunError> {
         let unread = differing_fields!(
             self,
@@ -220,16 +214,13 @@ impl RunConfig {
             Self {
                 file, options, seed, secret, shifts, settings, rigid_twin, vary, tasks, episodes,
                 selected_episodes, shard, threads, trace, video, mcap, out, resume;
-                policy, stored_scripts, observer
+                policy, is_numbered, stored_scripts, observer
             }
         );
         unread.first().map_or(Ok(()), |field| Err(self.no_effect(field, user)))
     }
 
     /// Checks that there are no options of a policy, since `user` has none.
-    ///
-    /// # Errors
-    /// An option of a policy.
     pub fn check_no_policy(&self, options: &PolicyOptions, user: impl fmt::Display) -> Result<(), RunError> {
         let given = options.differing(&PolicyOptions::default());
         given.first().map_or(Ok(()), |option| Err(self.no_effect(option, user)))
@@ -241,16 +232,13 @@ impl RunConfig {
     }
 
     /// A loaded script with the secret, whose suites vary as the configuration says.
-    ///
-    /// # Errors
-    /// A variation that is not valid, or does not fit a suite.
     pub(crate) fn prepare_script(&self, mut loaded: LoadedScript) -> Result<LoadedScript, RunError> {
         if let Some(file) = &self.vary {
             let (ranges, files) = softvt_script::load_variation(file)
                 .map_err(|error| RunError::from(error).in_setting("vary", ""))?;
             if ranges.changes_nothing() {
                 let file = file.display();
-                self.notice(format!("warning: --vary {file}: all its factors are 1 and its largest changes 0, so that nothing varies"));
+                self.notice(format_args!("warning: --vary {file}: all its factors are 1 and its largest changes 0, so that nothing varies"));
             }
             loaded.variation_files = files;
             loaded.vary(&ranges).map_err(|error| self.error_of("vary", "", error))?;
@@ -285,7 +273,6 @@ impl RunConfig {
         Self { options, shifts, settings, rigid_twin, vary, seed, secret, ..self }
     }
 
-    /// An error about the script.
     pub fn error(&self, message: impl fmt::Display) -> RunError {
         RunError::input(message).at(self.file.display())
     }
@@ -305,16 +292,12 @@ impl RunConfig {
         self.observer.notice(&message.to_string());
     }
 
-    /// The number of threads to use.
     pub fn thread_count(&self) -> usize {
         thread_count(self.threads)
     }
 
     /// Runs the jobs `0..count` of a list on the threads of the configuration until one fails or a stop is requested.
     /// `finish` takes each result and returns the line of progress for the observer.
-    ///
-    /// # Errors
-    /// A job or `finish` fails.
     pub(crate) fn run_jobs<T: Send>(
         &self,
         list: &JobList,
@@ -350,7 +333,6 @@ impl RunConfig {
         }
     }
 
-    /// Name of a suite in results.
     pub fn suite_name(&self, suite: &Suite) -> String {
         self.changes().suite_name(&suite.name)
     }
@@ -358,7 +340,6 @@ impl RunConfig {
 
 /// Shortest seed file, bytes: a shorter one is easily guessed from its hash.
 const MIN_SECRET_BYTES: usize = 16;
-/// Largest size of the file.
 const MAX_SECRET_BYTES: u64 = 1 << 20;
 
 /// The secret in a seed file.
@@ -390,40 +371,4 @@ pub fn read_secret(path: &Path) -> Result<SecretSeed, RunError> {
 pub fn thread_count(requested: Option<u16>) -> usize {
     let available = || std::thread::available_parallelism().map_or(1, |n| n.get());
     requested.map_or_else(available, usize::from)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_field_that_an_experiment_does_not_read_is_refused() {
-        let folder = tempfile::tempdir().expect("a folder");
-        let file = folder.path().join("x.lua");
-        let text =
-            "return softvt.experiment { name = 'e', grid = { x = { 1 } }, run = function() return {} end }";
-        std::fs::write(&file, text).expect("written");
-        let load = |change: fn(RunConfig) -> RunConfig| change(RunConfig::of(&file)).load();
-        let run = load(|config| RunConfig { threads: Some(2), seed: 3, out: Some("x".into()), ..config });
-        let options = PolicyOptions { replan: Some(2), ..PolicyOptions::default() };
-        let refused =
-            run.unwrap_or_else(|error| panic!("{error}")).with_policy(&options).err().expect("refused");
-        assert!(refused.to_string().ends_with(": replan: has no effect on an experiment; leave it out"));
-        type Change = fn(RunConfig) -> RunConfig;
-        let unread: [(&str, Change); 6] = [
-            ("secret", |config| RunConfig { secret: Some(SecretSeed::new(b"0123456789abcdef")), ..config }),
-            ("rigid_twin", |config| RunConfig { rigid_twin: true, ..config }),
-            ("vary", |config| RunConfig { vary: Some("x.lua".into()), ..config }),
-            ("episodes", |config| RunConfig { episodes: Some(1), ..config }),
-            ("trace", |config| RunConfig { trace: Some(TraceDetail::State), ..config }),
-            ("shard", |config| RunConfig { shard: Shard::new(1, 2), ..config }),
-        ];
-        for (field, change) in unread {
-            let message = load(change).err().expect(field).to_string();
-            assert!(
-                message.ends_with(&format!(": {field}: has no effect on an experiment; leave it out")),
-                "{message}"
-            );
-        }
-    }
 }

@@ -1,7 +1,7 @@
-//! Fields of a configuration that what is run does not read.
+//! Fields of a configuration that a plan does not read.
 //!
-//! What is run takes a part of the configuration and has the rest at its default. A field in which the two differ has
-//! no effect.
+//! A plan takes a part of the configuration and has the rest at its default. A field in which the two differ has no
+//! effect.
 
 /// Names of the fields in which two values of a type differ. The fields after a semicolon are not compared; a field
 /// that is in neither list does not compile.

@@ -9,13 +9,11 @@ use std::{
 };
 
 use crate::{config::TraceDetail, error::RunError};
-use softvt_common::cancel;
-use softvt_common::episode_id::EpisodeIndex;
-use softvt_common::files;
+use softvt_common::{cancel, episode_id::EpisodeIndex, files};
 use softvt_evaluation::judge::ControlStepScore;
 use softvt_report::{
     mcap,
-    video::{self, VideoCaption},
+    video::{self, FilmedEpisode},
 };
 use softvt_rollout::FinishedEpisode;
 use softvt_runs::{
@@ -29,7 +27,6 @@ use softvt_runs::{
 pub enum EpisodeFilter {
     /// All that are not safe.
     Failed,
-    /// All episodes.
     All,
     /// These episodes of each task.
     Episodes(Vec<u32>),
@@ -44,7 +41,6 @@ impl EpisodeFilter {
         }
     }
 
-    /// True if the finished episode is selected.
     fn selects(&self, record: &EpisodeRecord) -> bool {
         let is_excluded = *self == Self::Failed && record.verdict.safety;
         self.may_select(record.header.id.episode) && !is_excluded
@@ -126,9 +122,6 @@ impl EpisodeArtifacts<'_> {
     }
 
     /// Writes all files that are not made of the states.
-    ///
-    /// # Errors
-    /// A file cannot be written.
     pub(crate) fn write(&self, finished: &FinishedEpisode) -> Result<(), RunError> {
         let header = &finished.record.header;
         let index = header.id.index();
@@ -143,9 +136,6 @@ impl EpisodeArtifacts<'_> {
 
     /// Writes the requested MCAP file and renders the requested video, and for an unsafe episode a still of the
     /// moment that shows its result. Consumes the recorded states.
-    ///
-    /// # Errors
-    /// An image cannot be rendered or written.
     pub(crate) fn render(&self, finished: &mut FinishedEpisode) -> Result<(), RunError> {
         let (record, Some(mut states)) = (&finished.record, finished.recording.take()) else { return Ok(()) };
         let index = record.header.id.index();
@@ -157,14 +147,14 @@ impl EpisodeArtifacts<'_> {
         if !self.has_video(record) {
             return Ok(written?);
         }
-        let caption = VideoCaption::new(record);
+        let episode = &mut [FilmedEpisode { record, states: &mut states }];
         let path = video::video_path(self.dir, index);
         files::create_folder(path.parent().unwrap_or(self.dir))?;
         if !record.verdict.safety {
             let still = video::still_path(self.dir, index);
-            video::write_decisive_frame(&mut states, &caption, &still)?;
+            video::write_decisive_frame(episode, &still)?;
         }
-        video::write_video(&mut states, &caption, &path, 1, cancel::requested, || ())?;
+        video::write_video(episode, &path, 1, cancel::requested, || ())?;
         Ok(written?)
     }
 

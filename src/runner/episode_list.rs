@@ -6,17 +6,13 @@ use softvt_benchmark::Task;
 use softvt_common::episode_id::EpisodeIndex;
 use softvt_runs::shard::Shard;
 
-/// An episode to run.
 #[derive(Clone, Copy, Debug)]
 pub struct EpisodeJob<'a> {
-    /// Its task.
     pub task: &'a Task,
-    /// Its index in the task.
     pub episode: u32,
 }
 
 impl EpisodeJob<'_> {
-    /// Task and episode.
     pub fn index(&self) -> EpisodeIndex {
         EpisodeIndex { task: self.task.id, episode: self.episode }
     }
@@ -47,7 +43,6 @@ impl<'a> EpisodeList<'a> {
         Self { tasks, episodes, shard, omitted: BTreeSet::new() }
     }
 
-    /// These episodes.
     pub fn listed(jobs: impl IntoIterator<Item = EpisodeJob<'a>>) -> Self {
         let jobs: Vec<EpisodeJob> = jobs.into_iter().collect();
         let mut tasks: Vec<&Task> = jobs.iter().map(|job| job.task).collect();
@@ -62,14 +57,12 @@ impl<'a> EpisodeList<'a> {
         self.tasks.clone()
     }
 
-    /// The list without these episodes.
     pub fn without(&self, done: impl Iterator<Item = EpisodeIndex>) -> Self {
         let mut left = self.clone();
         left.omitted.extend(done.filter(|index| self.find(*index).is_some()));
         left
     }
 
-    /// Number of episodes.
     pub fn len(&self) -> usize {
         let all = match &self.episodes {
             Episodes::First(count) => self.tasks.len() * *count as usize,
@@ -78,7 +71,6 @@ impl<'a> EpisodeList<'a> {
         self.shard.map_or(all, |shard| shard.len(all)) - self.omitted.len()
     }
 
-    /// True if no episode is left.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
@@ -91,7 +83,6 @@ impl<'a> EpisodeList<'a> {
         self.iter().nth(position).expect("a position in the list")
     }
 
-    /// The episodes in order.
     pub fn iter(&self) -> impl Iterator<Item = EpisodeJob<'a>> + '_ {
         (0..self.tasks.len()).flat_map(|rank| self.of_rank(rank))
     }

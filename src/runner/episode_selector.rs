@@ -1,4 +1,4 @@
-//! [`EpisodeSelector`]: one episode of a run, or one demonstration of a dataset.
+//! [`EpisodeSelector`]: the episode of a run or the demonstration of a dataset that a command names.
 
 use std::{path::Path, str::FromStr};
 
@@ -17,7 +17,6 @@ pub enum EpisodeSelector {
     Line(usize),
     /// `TASK/EPISODE`.
     Episode {
-        /// Index of the task.
         task: usize,
         /// Index of the episode of the task, or of the demonstration in its file.
         episode: u32,
@@ -40,16 +39,13 @@ impl FromStr for EpisodeSelector {
 
 impl EpisodeSelector {
     /// The record of the episode in a run.
-    ///
-    /// # Errors
-    /// The run has no such episode.
     pub fn find_record(self, stored: &StoredRun) -> Result<&EpisodeRecord, RunError> {
         let found = match self {
             Self::Line(line) => stored.records.get(line),
             Self::Episode { task, episode } => stored.record(EpisodeIndex { task, episode }),
         };
         found.ok_or_else(|| {
-            RunError::input(format!(
+            RunError::input(format_args!(
                 "{} has no such episode; it has {}: select one by TASK/EPISODE, or by its line number from 0",
                 stored.dir.display(),
                 counted(stored.records.len(), "episode")
@@ -65,7 +61,7 @@ impl EpisodeSelector {
         let demos = demos_of(path)?;
         let count = demos.len();
         let not_found = || {
-            RunError::input(format!(
+            RunError::input(format_args!(
                 "{} has no such demonstration; it has {count}: select one by TASK/DEMO, or by its number from 0",
                 path.display()
             ))
@@ -82,7 +78,7 @@ impl EpisodeSelector {
                     [] => Err(not_found()),
                     _ => {
                         let files: Vec<&str> = found.iter().map(|entry| entry.hdf5_path.as_str()).collect();
-                        Err(RunError::input(format!(
+                        Err(RunError::input(format_args!(
                             "{}: several suites have a task {task}; select one of the files {}",
                             path.display(),
                             files.join(", ")

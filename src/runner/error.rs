@@ -4,7 +4,6 @@ use std::path::PathBuf;
 
 use softvt_common::{cancel, files::FileError};
 
-/// Causes of a [`RunError`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum RunErrorCause {
     /// A script, an argument or a file that is not valid.
@@ -18,7 +17,6 @@ pub enum RunErrorCause {
 /// A setting of a run, by its field of [`RunConfig`](crate::RunConfig) or [`PolicyOptions`](crate::PolicyOptions).
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct FaultySetting {
-    /// Name of the field.
     pub field: &'static str,
     /// The value that is not valid; empty if the message says it.
     pub value: String,
@@ -30,18 +28,16 @@ pub struct FaultySetting {
 pub struct RunError {
     /// Its cause, which decides the exit code of a command.
     pub cause: RunErrorCause,
-    /// Where it is, such as a file; empty if the message says it.
+    /// Place of the error, such as a file; empty if the message says it.
     pub place: String,
     /// The setting at fault, if it is one.
     pub setting: Option<FaultySetting>,
-    /// The problem and the remedy.
     pub message: String,
     /// Folder of the run, if it was interrupted and can be resumed.
     pub resumable: Option<PathBuf>,
 }
 
 impl RunError {
-    /// An error with this cause.
     pub fn new(cause: RunErrorCause, message: impl ToString) -> Self {
         Self { cause, place: String::new(), setting: None, message: message.to_string(), resumable: None }
     }
@@ -78,7 +74,6 @@ impl RunError {
         Self::new(RunErrorCause::Interrupt, message)
     }
 
-    /// Puts a place before the text.
     pub fn at(self, place: impl std::fmt::Display) -> Self {
         let separator = if self.place.is_empty() { "" } else { ": " };
         Self { place: format!("{place}{separator}{}", self.place), ..self }
@@ -89,7 +84,6 @@ impl RunError {
         Self { message: format!("{} ({part})", self.message), ..self }
     }
 
-    /// Adds a line to the message.
     pub(crate) fn with_line(self, line: &str) -> Self {
         Self { message: format!("{}\n{line}", self.message), ..self }
     }
@@ -113,8 +107,6 @@ input_errors!(
     softvt_evaluation::thresholds::ThresholdError,
     softvt_report::mcap::EpisodeMcapError,
     softvt_report::video::EpisodeVideoError,
-    softvt_runs::actions::ActionsError,
     softvt_runs::run_folder::RunFolderError,
-    softvt_runs::stored_run::StoredRunError,
     softvt_script::ScriptError,
 );

@@ -14,9 +14,7 @@ use crate::{
     stored_scripts::StoredScripts,
     suite_run::PreparedRun,
 };
-use softvt_common::cancel;
-use softvt_common::episode_id::EpisodeIndex;
-use softvt_common::{files, parallel, text::counted};
+use softvt_common::{cancel, episode_id::EpisodeIndex, files, parallel, text::counted};
 use softvt_evaluation::{category::EpisodeCategory, verdict::Outcome};
 use softvt_policy::PolicyError;
 use softvt_rollout::{Episode, FinishedEpisode};
@@ -35,7 +33,6 @@ use softvt_runs::{
 pub struct SuiteResult {
     /// Folder of the run, if it has one.
     pub folder: Option<PathBuf>,
-    /// Rates and distributions.
     pub summary: SuiteSummary,
     /// One record per episode, in order of task and episode.
     pub records: Vec<EpisodeRecord>,
@@ -62,38 +59,33 @@ pub(crate) struct SimulatedEpisode {
     pub rendered: Result<(), RunError>,
 }
 
-/// The folder of a run in progress, and the records of its finished episodes.
+/// The records of a run in progress and, if it has one, its folder.
 pub(crate) struct RunLog<'a> {
     run: &'a PreparedRun<'a>,
-    folder: RunFolder,
+    folder: Option<RunFolder>,
     pub records: Vec<EpisodeRecord>,
-    /// Those of a policy outside of softvt.
+    /// Attempts of a policy outside of softvt.
     pub attempts: Option<Arc<Attempts>>,
 }
 
 impl<'a> RunLog<'a> {
-    /// Creates the folder of a run, or with `resume` continues it.
-    ///
-    /// # Errors
-    /// The folder is of another run or anything else, or cannot be written.
+    /// Creates the folder of a run that has one, or with `resume` continues it.
     pub(crate) fn open(run: &'a PreparedRun, manifest: &RunManifest, resume: bool) -> Result<Self, RunError> {
+        let Some(dir) = &run.out else {
+            return Ok(Self { run, folder: None, records: Vec::new(), attempts: None });
+        };
         let opened = match resume {
-            true => RunFolder::resume(&run.out, manifest),
-            false => RunFolder::create(&run.out, manifest).map(|folder| (folder, Vec::new())),
+            true => RunFolder::resume(dir, manifest),
+            false => RunFolder::create(dir, manifest).map(|folder| (folder, Vec::new())),
         };
         let (folder, records) = opened.map_err(|error| run.config.error(error))?;
-        let attempts = match run.config.policy.is_outside() {
-            true => Some(Arc::new(Attempts::open(folder.path())?)),
-            false => None,
-        };
-        StoredScripts::new(run.loaded, run.calibration_files.texts()).write(folder.path())?;
-        Ok(Self { run, folder, records, attempts })
+        let attempts = run.config.policy.is_outside().then(|| Attempts::open(dir)).transpose()?;
+        let calibrations = run.calibration_files.as_ref().map(|files| files.texts());
+        StoredScripts::new(run.loaded, calibrations.unwrap_or_default()).write(dir)?;
+        Ok(Self { run, folder: Some(folder), records, attempts: attempts.map(Arc::new) })
     }
 
     /// Runs jobs of a list. Writes the files of each finished episode, and then its line.
-    ///
-    /// # Errors
-    /// A script, policy or file that fails. Finished episodes are kept.
     pub(crate) fn run_jobs<'j>(
         &mut self,
         list: &JobList,
@@ -104,7 +96,8 @@ impl<'a> RunLog<'a> {
     ) -> Result<(), RunError> {
         let (config, simulate) = (self.run.config, |position| simulate(jobs.job(position)));
         config.run_jobs(list, jobs.len(), simulate, |_, SimulatedEpisode { finished, rendered }| {
-            let unended = unended_note(&finished);
+            // The controller had more to do.
+            let unended = finished.unended.as_ref().map_or(String::new(), |unended| format!("; {unended}"));
             let record = self.add(finished, &write)?;
             report_unrendered(config, record.header.id.index(), rendered);
             Ok(line(record) + &unended)
@@ -112,9 +105,6 @@ impl<'a> RunLog<'a> {
     }
 
     /// Writes the files of a finished episode, and then its line, so that every listed episode is complete.
-    ///
-    /// # Errors
-    /// A file cannot be written.
     pub(crate) fn add(
         &mut self,
         mut finished: FinishedEpisode,
@@ -122,19 +112,18 @@ impl<'a> RunLog<'a> {
     ) -> Result<&EpisodeRecord, RunError> {
         let index = finished.record.header.id.index();
         finished.record.stats.attempts = self.attempts.as_ref().and_then(|attempts| attempts.several(index));
-        write(&finished)?;
-        self.folder.append(&finished.record)?;
+        if let Some(folder) = &mut self.folder {
+            write(&finished)?;
+            folder.append(&finished.record)?;
+        }
         self.records.push(finished.record);
         Ok(&self.records[self.records.len() - 1])
     }
 
     /// Sorts the records and the lines of the folder.
-    ///
-    /// # Errors
-    /// The folder cannot be written.
     pub(crate) fn sort(&mut self) -> Result<(), RunError> {
         self.records.sort_by_key(|record| record.header.id.index());
-        Ok(self.folder.write_in_order(&self.records)?)
+        Ok(self.folder.as_mut().map_or(Ok(()), |folder| folder.write_in_order(&self.records))?)
     }
 
     /// True if there is neither a record nor an attempt.
@@ -142,44 +131,53 @@ impl<'a> RunLog<'a> {
         self.records.is_empty() && self.attempts.as_ref().is_none_or(|attempts| attempts.is_empty())
     }
 
-    /// Removes the folder. The same command must work once an error is fixed, if there is nothing to keep.
-    ///
-    /// # Errors
-    /// A file cannot be removed.
     pub(crate) fn discard(self) -> Result<(), RunError> {
-        Ok(self.folder.discard()?)
+        Ok(self.folder.map_or(Ok(()), RunFolder::discard)?)
     }
 
-    /// Sorts the episodes of a complete evaluation and writes its results.
-    ///
-    /// # Errors
-    /// A file cannot be written.
+    /// Ends the jobs: after an error, a folder without anything to keep is removed, so that the same command works
+    /// once the error is fixed; otherwise the error says what `kept` describes.
+    pub(crate) fn end(
+        self,
+        outcome: Result<(), RunError>,
+        kept: impl FnOnce(&Self) -> String,
+        resumable: &Path,
+    ) -> Result<Self, RunError> {
+        match outcome {
+            Err(error) if error.cause != RunErrorCause::Interrupt && self.is_empty() => {
+                self.discard()?;
+                Err(error)
+            }
+            outcome => with_kept(outcome, &kept(&self), Some(resumable)).map(|()| self),
+        }
+    }
+
+    /// Sorts the episodes of a complete evaluation and writes its results, if it has a folder.
     pub(crate) fn write_results(&mut self) -> Result<(), RunError> {
         self.sort()?;
-        let calibrations = self.run.calibrations.clone();
-        softvtbench_files::write_scores(&self.run.out, &self.records, &calibrations.merged.released())?;
+        let Some(dir) = &self.run.out else { return Ok(()) };
+        softvtbench_files::write_scores(dir, &self.records, &self.run.calibrations.merged.released())?;
         self.write_summary()
     }
 
     /// Writes the summary. A folder with a summary counts as finished.
-    ///
-    /// # Errors
-    /// The file cannot be written.
     pub(crate) fn write_summary(&self) -> Result<(), RunError> {
-        files::write_json(&self.run.out.join(SUMMARY), &self.summary())?;
+        if let Some(dir) = &self.run.out {
+            files::write_json(&dir.join(SUMMARY), &self.summary())?;
+        }
         Ok(self.attempts.as_ref().map_or(Ok(()), |attempts| attempts.remove())?)
     }
 
-    /// Summary of the episodes so far.
     pub(crate) fn summary(&self) -> SuiteSummary {
         SuiteSummary::from_records(&self.run.name, &self.run.config.policy.name, &self.records)
+    }
+
+    fn into_result(self) -> SuiteResult {
+        SuiteResult { folder: self.run.out.clone(), summary: self.summary(), records: self.records }
     }
 }
 
 /// Adds to the outcome of a run what it kept, and reports an interrupt with `hint` on how to continue.
-///
-/// # Errors
-/// The outcome is an error, or the run was interrupted.
 pub(crate) fn with_kept(
     outcome: Result<(), RunError>,
     kept: &str,
@@ -191,17 +189,13 @@ pub(crate) fn with_kept(
         Ok(()) if !cancel::requested() => Ok(()),
         _ => {
             let resumable = resumable.map(Path::to_owned);
-            Err(RunError { resumable, ..RunError::interrupted(format!("interrupted; {kept}")) })
+            Err(RunError { resumable, ..RunError::interrupted(format_args!("interrupted; {kept}")) })
         }
     }
 }
 
-/// Runs the episodes of a prepared suite into its folder, and calls `on_episode` for each one that it has run and
-/// written, in the order in which they end. Episodes that are there already are kept.
-///
-/// # Errors
-/// The folder contains another run, or one that may not be resumed; a script, policy or file fails; or the run is
-/// interrupted. Finished episodes are kept.
+/// Runs the episodes of a prepared suite, into its folder if it has one, and calls `on_episode` for each one that it
+/// has run, in the order in which they end. Episodes that are in the folder already are kept.
 pub(crate) fn run_suite(
     run: &PreparedRun,
     on_episode: &mut dyn FnMut(&EpisodeRecord),
@@ -209,22 +203,18 @@ pub(crate) fn run_suite(
     let config = run.config;
     let manifest = run.manifest(config.episodes_of(run.suite));
     // The same command again on a finished folder changes nothing, even without --resume.
-    let finished = is_finished(&run.out) && manifest.is_in(&run.out);
-    let mut log = RunLog::open(run, &manifest, config.resume || finished)?;
+    let finished = run.out.as_deref().filter(|out| is_finished(out) && manifest.is_in(out));
+    let mut log = RunLog::open(run, &manifest, config.resume || finished.is_some())?;
     let artifacts = run.artifacts();
     let remaining = run.jobs.without(log.records.iter().map(|record| record.header.id.index()));
-    let out = run.out.display();
-    if finished
-        && remaining.is_empty()
-        && softvtbench_files::has_scores(&run.out)
-        && log.records.iter().all(|record| artifacts.missing(record).is_empty())
-    {
-        config.notice(format!("{out} is already complete"));
-        return Ok(SuiteResult {
-            folder: Some(run.out.clone()),
-            summary: log.summary(),
-            records: log.records,
-        });
+    let is_whole = |out: &&Path| {
+        remaining.is_empty()
+            && softvtbench_files::has_scores(out)
+            && log.records.iter().all(|record| artifacts.missing(record).is_empty())
+    };
+    if let Some(out) = finished.filter(is_whole) {
+        config.notice(format_args!("{} is already complete", out.display()));
+        return Ok(log.into_result());
     }
     let attempts = log.attempts.clone();
     let simulate = |job: EpisodeJob| {
@@ -235,7 +225,7 @@ pub(crate) fn run_suite(
             let begun = attempts.as_ref().filter(|_| calls == 2).map(|attempts| attempts.begin(job.index()));
             begun.unwrap_or(Ok(())).map_err(|error| PolicyError::Script(error.to_string()))
         };
-        let (origin, keep_states) = (run.origins.get(&job.index()), artifacts.may_render(job.episode));
+        let (origin, keep_states) = (run.import.origins.get(&job.index()), artifacts.may_render(job.episode));
         let simulated = run.simulate(job, origin, keep_states, &run.controllers, &mut begin)?;
         let mut finished = simulated.map_err(|error| run.episode_error(&error))?;
         let rendered = artifacts.render(&mut finished);
@@ -247,59 +237,26 @@ pub(crate) fn run_suite(
             config.observer.judged(record.category());
             episode_line(record)
         };
-        log.run_jobs(
-            &config.job_list(&format!("running {}", run.name)),
-            &remaining,
-            simulate,
-            |finished| artifacts.write(finished),
-            line,
-        )
+        let list = config.job_list(&format!("running {}", run.name));
+        log.run_jobs(&list, &remaining, simulate, |finished| artifacts.write(finished), line)
     });
-    match outcome {
-        Err(error) if error.cause != RunErrorCause::Interrupt && log.is_empty() => {
-            log.discard()?;
-            return Err(error);
+    match &run.out {
+        Some(out) => {
+            let all = counted(run.jobs.len(), "episode");
+            let kept = |log: &RunLog| format!("{} of {all} are in {}", log.records.len(), out.display());
+            log = log.end(outcome, kept, out)?;
+            log.write_results()?;
+            config.notice(out.display());
         }
-        outcome => {
-            let kept =
-                format!("{} of {} are in {out}", log.records.len(), counted(run.jobs.len(), "episode"));
-            with_kept(outcome, &kept, Some(&run.out))?;
+        None => {
+            outcome?;
+            if cancel::requested() {
+                return Err(RunError::interrupted("interrupted"));
+            }
+            log.sort()?;
         }
     }
-    log.write_results()?;
-    config.notice(out);
-    Ok(SuiteResult { folder: Some(run.out.clone()), summary: log.summary(), records: log.records })
-}
-
-/// Runs the episodes of a prepared suite and writes nothing. Calls `on_episode` for each, in the order
-/// in which they end.
-///
-/// # Errors
-/// A script or policy fails, or a request to stop.
-pub(crate) fn run_episodes(
-    run: &PreparedRun,
-    on_episode: &mut dyn FnMut(&EpisodeRecord),
-) -> Result<SuiteResult, RunError> {
-    let (config, mut records) = (run.config, Vec::new());
-    let simulate = |position| run.run_episode(run.jobs.job(position), false, &run.controllers);
-    config.run_jobs(
-        &config.job_list(&format!("running {}", run.name)),
-        run.jobs.len(),
-        simulate,
-        |_, finished: FinishedEpisode| {
-            on_episode(&finished.record);
-            config.observer.judged(finished.record.category());
-            let line = episode_line(&finished.record) + &unended_note(&finished);
-            records.push(finished.record);
-            Ok(line)
-        },
-    )?;
-    if cancel::requested() {
-        return Err(RunError::interrupted("interrupted"));
-    }
-    records.sort_by_key(|record| record.header.id.index());
-    let summary = SuiteSummary::from_records(&run.name, &config.policy.name, &records);
-    Ok(SuiteResult { folder: None, summary, records })
+    Ok(log.into_result())
 }
 
 /// True if a folder contains a finished run.
@@ -310,13 +267,8 @@ pub(crate) fn is_finished(dir: &Path) -> bool {
 /// Reports an episode whose video or MCAP file could not be written. The episode counts nevertheless.
 fn report_unrendered(config: &RunConfig, index: EpisodeIndex, rendered: Result<(), RunError>) {
     if let Err(error) = rendered {
-        config.notice(format!("warning: {index} lacks a file: {error}"));
+        config.notice(format_args!("warning: {index} lacks a file: {error}"));
     }
-}
-
-/// The end of the line of an episode whose controller had not ended.
-fn unended_note(finished: &FinishedEpisode) -> String {
-    finished.unended.as_ref().map_or(String::new(), |unended| format!("; {unended}"))
 }
 
 /// Formats an episode as one line of progress.
@@ -352,30 +304,27 @@ pub(crate) fn episode_line(record: &EpisodeRecord) -> String {
 /// Restores requested files of finished episodes that are missing: by the recorded actions, or without
 /// these by the policy unless it is in another program. Files that cannot be restored are reported; the
 /// results of their episodes stay.
-///
-/// # Errors
-/// An episode cannot be run, or a file cannot be written.
 pub(crate) fn restore_artifacts(run: &PreparedRun, records: &[EpisodeRecord]) -> Result<(), RunError> {
     let artifacts = run.artifacts();
     let incomplete = records.iter().filter(|record| !artifacts.missing(record).is_empty());
     let has_actions = |record: &EpisodeRecord| artifacts.has_actions(record);
     for record in records {
-        let path = actions::path(&run.out, record.header.id.index());
-        if let (true, Err(damage)) = (path.is_file(), actions::read_checked(&run.out, record)) {
+        let path = actions::path(artifacts.dir, record.header.id.index());
+        if let (true, Err(damage)) = (path.is_file(), actions::read_checked(artifacts.dir, record)) {
             run.config.notice(damage);
         }
     }
     let (restorable, lost): (Vec<_>, Vec<_>) =
         incomplete.partition(|record| has_actions(record) || run.config.policy.profile().is_none());
     if let Some(first) = lost.first() {
-        run.config.notice(format!(
+        run.config.notice(format_args!(
             "{} finished episodes lack their actions, so their files cannot be restored (first: {}); their results stay",
             lost.len(),
             first.header.id.index()
         ));
     }
     if let Some(path) = restorable.first().and_then(|record| artifacts.missing(record).into_iter().next()) {
-        run.config.notice(format!(
+        run.config.notice(format_args!(
             "restoring files of {} (first: {})",
             counted(restorable.len(), "finished episode"),
             path.display()
@@ -408,14 +357,14 @@ fn simulate_again(
     let Some(job) = run.jobs.find(index) else { return Ok(None) };
     let keep_states = artifacts.may_render(index.episode);
     let mut finished = if has_actions {
-        let recorded = actions::read_checked(&run.out, record)?;
+        let recorded = actions::read_checked(artifacts.dir, record)?;
         run.run_episode(job, keep_states, &replay_factory(recorded, record))?
     } else {
         run.run_episode(job, keep_states, &run.controllers)?
     };
     finished.record = with_policy_fields(finished.record, record);
     if let Some(difference) = difference(record, &finished.record)? {
-        run.config.notice(format!(
+        run.config.notice(format_args!(
             "files of {index} are not restored: the simulation differs from its record ({difference}); its results stay"
         ));
         return Ok(None);

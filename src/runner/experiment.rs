@@ -9,8 +9,8 @@ use crate::{
     error::RunError,
 };
 use softvt_benchmark::Plan;
-use softvt_common::cancel;
 use softvt_common::{
+    cancel,
     files::replace,
     table::{Column, Table},
     text::{counted, is_misspelt, significant, unknown_name},
@@ -59,9 +59,6 @@ fn cell(value: Option<&Value>) -> String {
 /// Runs all points of the experiment that a script returned, or of an interrupted one the others. With an output
 /// folder, the rows and the files of the script are written into it; without one, the files of the script are written
 /// below the working folder.
-///
-/// # Errors
-/// The script fails or tells a problem, a setting or the seed changes nothing, or a file cannot be written.
 pub fn run<E: From<RunError>>(
     ConfiguredScript { config, script: loaded }: &ConfiguredScript,
     mut on_output: impl FnMut(ExperimentOutput) -> Result<(), E>,
@@ -74,7 +71,7 @@ pub fn run<E: From<RunError>>(
     if *has_finish && out.is_none() {
         refuse_changed_project_files(config, loaded)?;
     }
-    // Each point runs the script anew: what a point changes of its variables does not reach others.
+    // Each point runs the script again: its changes of variables do not reach other points.
     let open = || Experiment::open_with(loaded, &input).map_err(RunError::from);
     let manifest = manifest(config, loaded, name, points);
     let opened = out.map(|dir| ExperimentFolder::open(dir, &manifest, config.resume)).transpose();
@@ -111,15 +108,17 @@ pub fn run<E: From<RunError>>(
         on_output(ExperimentOutput::Rows(&rows))?;
         let done = format!("interrupted; the rows of {} of {points} points are above", finished.len());
         let Some(dir) = out else {
-            return Err(RunError::interrupted(format!("{done}; no file was written")).into());
+            return Err(RunError::interrupted(format_args!("{done}; no file was written")).into());
         };
         return Err(RunError { resumable: Some(dir.into()), ..RunError::interrupted(done) }.into());
     }
-    // Points of an earlier process may have used what these did not.
-    let refused = match left.len() == points {
-        true => refusal(config, &input, &rows, columns),
-        false => None,
-    };
+    // Settings or a seed that no point used, or rows that lack something; points of an earlier process may have used
+    // what these did not.
+    let refused = (left.len() == points).then(|| {
+        let unused = input.check_used().err().map(|error| input_error(config, &error));
+        unused.or_else(|| problem_of(&rows, columns).map(|problem| config.error(problem)))
+    });
+    let refused = refused.flatten();
     if (outcome.is_err() && finished.is_empty()) || (outcome.is_ok() && refused.is_some()) {
         folder.take().map_or(Ok(()), ExperimentFolder::discard).map_err(RunError::from)?;
     }
@@ -138,18 +137,7 @@ pub fn run<E: From<RunError>>(
     Ok(finish.problem.map_or(Ok(()), |problem| Err(config.error(problem)))?)
 }
 
-/// The error of an experiment that has run whole: settings or a seed that no point used, or rows that lack something.
-fn refusal(
-    config: &RunConfig,
-    input: &ExperimentInput,
-    rows: &[ExperimentRow],
-    columns: &[String],
-) -> Option<RunError> {
-    let unused = input.check_used().err().map(|error| input_error(config, &error));
-    unused.or_else(|| problem_of(rows, columns).map(|problem| config.error(problem)))
-}
-
-/// What the rows of all points lack.
+/// Columns or rows that all points lack.
 fn problem_of(rows: &[ExperimentRow], columns: &[String]) -> Option<String> {
     if rows.is_empty() {
         return Some(
@@ -200,8 +188,7 @@ fn input(config: &RunConfig) -> Result<ExperimentInput, RunError> {
 }
 
 fn input_error(config: &RunConfig, error: &ExperimentInputError) -> RunError {
-    let field = if *error == ExperimentInputError::NoRandomNumbers { "seed" } else { "settings" };
-    config.error_of(field, error.path().unwrap_or_default(), error)
+    config.error_of(error.input, &error.path, error)
 }
 
 /// Refuses to write files into the project that were made with changed settings, another seed or an option that says
@@ -218,7 +205,7 @@ fn refuse_changed_project_files(config: &RunConfig, loaded: &LoadedScript) -> Re
     let changed = |option: &&OptionSpec| option.needs_out && option.value != option.default;
     match loaded.options.iter().find(changed) {
         None => Ok(()),
-        Some(option) => Err(config.error(format!("{} {}: {message}", option.flag(), option.value))),
+        Some(option) => Err(config.error(format_args!("{} {}: {message}", option.flag(), option.value))),
     }
 }
 
@@ -227,20 +214,22 @@ fn refuse_changed_project_files(config: &RunConfig, loaded: &LoadedScript) -> Re
 fn write(config: &RunConfig, relative: &str, bytes: &[u8]) -> Result<(), RunError> {
     let first = relative.split('/').next().unwrap_or_default();
     if config.out.is_some() && RESERVED.iter().any(|name| first.eq_ignore_ascii_case(name)) {
-        return Err(config.error(format!("finish.files: {relative} is written by softvt; give another path")));
+        return Err(
+            config.error(format_args!("finish.files: {relative} is written by softvt; give another path"))
+        );
     }
     let base = config.out.clone().unwrap_or_default();
     let path = base.join(relative);
     let between = path.ancestors().skip(1).take_while(|folder| *folder != base);
     if let Some(link) = between.into_iter().find(|folder| folder.is_symlink()) {
-        return Err(RunError::input(format!(
+        return Err(RunError::input(format_args!(
             "{}: {} is a link; files of scripts are written into real folders only",
             path.display(),
             PathBuf::from(link).display()
         )));
     }
     replace(&path, bytes)?;
-    config.notice(format!("wrote {}", path.display()));
+    config.notice(format_args!("wrote {}", path.display()));
     Ok(())
 }
 
@@ -248,10 +237,6 @@ fn write(config: &RunConfig, relative: &str, bytes: &[u8]) -> Result<(), RunErro
 mod tests {
     use super::*;
     use serde_json::json;
-
-    fn row(value: Value) -> ExperimentRow {
-        serde_json::from_value(value).unwrap()
-    }
 
     #[test]
     fn small_numbers_keep_three_digits() {
@@ -265,16 +250,5 @@ mod tests {
         ] {
             assert_eq!(cell(Some(&json!(number))), text, "{number}");
         }
-    }
-
-    #[test]
-    fn a_misspelt_column_is_named_and_one_of_another_option_is_not() {
-        let rows = [row(json!({ "width_mm": 1, "force_n": 2 }))];
-        let problem = |columns: &[&str]| {
-            problem_of(&rows, &columns.iter().map(ToString::to_string).collect::<Vec<_>>())
-        };
-        let expected = "experiment.columns: no row has \"widht_mm\"; did you mean \"width_mm\"?";
-        assert_eq!(problem(&["force_n", "widht_mm"]).as_deref(), Some(expected));
-        assert_eq!(problem(&["width_mm", "strain"]), None);
     }
 }

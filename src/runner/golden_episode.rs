@@ -1,6 +1,6 @@
 //! The golden episode, whose final state is published: a machine that ends in another computes other results.
 
-use std::{path::PathBuf, sync::Arc};
+use std::sync::Arc;
 
 use serde::Deserialize;
 
@@ -12,23 +12,18 @@ use super::{
     suite_run::SuiteRun,
 };
 use softvt_benchmark::Plan;
+use softvt_common::episode_id::EpisodeSplit;
 
 /// `assets/golden.json`: an episode and its final state.
 #[derive(Clone, Debug, Deserialize)]
 pub struct GoldenEpisode {
-    /// Suite of the episode.
     pub script: String,
-    /// Index of its task.
     pub task: usize,
-    /// Hash of the final state.
     pub state_hash: String,
 }
 
 impl GoldenEpisode {
     /// The published one; `None` in a build without it.
-    ///
-    /// # Errors
-    /// The file is not valid.
     pub fn published() -> Result<Option<Self>, RunError> {
         let file = softvt_script::embedded("assets/golden.json");
         Ok(file.map(serde_json::from_slice).transpose()?)
@@ -43,9 +38,10 @@ impl GoldenEpisode {
         let ConfiguredScript { config, script } = &loaded;
         let Plan::Suite(suite) = &script.plan else { return Err(config.error("is not a suite")) };
         let task = suite.tasks.iter().find(|task| task.id == self.task);
-        let task = task.ok_or_else(|| config.error(format!("has no task {}", self.task)))?;
+        let task = task.ok_or_else(|| config.error(format_args!("has no task {}", self.task)))?;
         let job = EpisodeJob { task, episode: 0 };
-        let run = SuiteRun::new(config, script, suite, EpisodeList::listed(vec![job]), PathBuf::new())?;
+        let run =
+            SuiteRun::new(config, script, suite, EpisodeList::listed(vec![job]), EpisodeSplit::Validation)?;
         Ok(run.run_episode(job, false, &run.controllers)?.record.stats.state_hash)
     }
 }

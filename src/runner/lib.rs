@@ -1,10 +1,10 @@
 //! Runs: the episodes of suites under a policy, into folders that can be continued, merged, replayed and reported.
 //!
-//! A [`Runner`] runs the suites of a script, [`conditions`] runs them under changes, [`recording`] makes datasets of
+//! [`run_suites`] runs the suites of a script, [`conditions`] runs them under changes, [`recording`] makes datasets of
 //! them, and [`replay`] simulates recorded episodes again. [`SuiteRun`] is below all of them: a suite with everything
 //! that its episodes need; [`PreparedRun`] is one whose scenes are valid, with the limits of their objects. Nothing
 //! here prints: progress and messages go to an [`Observer`].
-#![warn(missing_docs, unreachable_pub)]
+#![warn(unreachable_pub)]
 
 pub mod bench_growth;
 pub mod bench_rates;
@@ -19,6 +19,7 @@ mod error;
 mod evaluate;
 pub mod experiment;
 mod golden_episode;
+#[cfg(feature = "import")]
 pub mod import;
 mod limits;
 mod observer;
@@ -31,7 +32,9 @@ pub mod replay;
 mod run_manifest;
 mod runner;
 pub mod script_catalog;
+#[cfg(feature = "serve")]
 mod served_runs;
+#[cfg(feature = "serve")]
 mod serving;
 pub mod stored_folder;
 mod stored_scripts;
@@ -52,8 +55,10 @@ pub use policy::{
     expert_controller, parse_profile,
 };
 pub use record::{DemoCount, record};
-pub use runner::Runner;
+pub use runner::run_suites;
+#[cfg(feature = "serve")]
 pub use served_runs::ServedRuns;
+#[cfg(feature = "serve")]
 pub use serving::SuiteServer;
 pub use softvt_runs::shard::Shard;
 pub use stored_scripts::StoredScripts;

@@ -11,9 +11,8 @@ use std::{
     sync::{Arc, Mutex},
 };
 
-use crate::{error::RunError, observer::Observer, stored_scripts::StoredScripts};
-use softvt_common::episode_id::EpisodeIndex;
-use softvt_common::{digest::sha256_hex, files, parallel::lock, text::counted};
+use crate::{config::RunConfig, error::RunError, observer::Observer, stored_scripts::StoredScripts};
+use softvt_common::{digest::sha256_hex, episode_id::EpisodeIndex, files, parallel::lock, text::counted};
 use softvt_evaluation::{
     instance::{InstanceFactors, InstancePresses},
     safety::{DeformationLimit, NOMINAL_KAPPA},
@@ -34,7 +33,6 @@ pub(crate) struct CalibrationFiles {
     observer: Arc<dyn Observer>,
 }
 
-/// A calibration file of one asset.
 #[derive(Debug)]
 struct CalibrationFile {
     /// Path below a project folder.
@@ -78,24 +76,17 @@ pub(crate) struct SceneLimits {
 
 impl CalibrationFiles {
     /// The files above a script, or those of a stored run.
-    pub(crate) fn new(
-        script: &Path,
-        stored: Option<Arc<StoredScripts>>,
-        observer: Arc<dyn Observer>,
-    ) -> Self {
+    pub(crate) fn new(config: &RunConfig) -> Self {
         Self {
-            script: script.to_owned(),
-            stored,
+            script: config.file.clone(),
+            stored: config.stored_scripts.clone(),
             read: Mutex::default(),
             reported: Mutex::default(),
-            observer,
+            observer: config.observer.clone(),
         }
     }
 
     /// Limits of the soft objects of a scene. `targets` are the objects that the task moves.
-    ///
-    /// # Errors
-    /// A calibration file that is not valid.
     pub(crate) fn limits_of(&self, scene: &Scene, targets: &[&str]) -> Result<SceneLimits, RunError> {
         let mut found = SceneLimits::default();
         for object in scene.objects.iter().filter(|object| matches!(object.asset.body, Body::Soft(_))) {
@@ -126,18 +117,15 @@ impl CalibrationFiles {
         };
         let path = &file.path;
         Ok(match (file.thresholds.fingerprints.get(name), object.departure()) {
-            (None, _) => Err(format!(
-                "{path} has no fingerprint of {name:?}, so that it may be of a different version: {remedy}"
-            )),
-            (Some(calibrated), _) if *calibrated != asset.fingerprint() => Err(format!(
+            (calibrated, _) if calibrated != Some(&asset.fingerprint()) => Err(format!(
                 "{path} was computed for a different version of {name:?} (its shape, material or friction differ): {remedy}"
             )),
-            (Some(_), Some(change)) => Err(format!(
+            (_, Some(change)) => Err(format!(
                 "no limit for object {:?}: it has {change} of asset {name:?}, which makes it another object: {effect}; \
                  define an asset of its own and calibrate it",
                 object.name
             )),
-            (Some(_), None) => file.limit(object).ok_or_else(|| {
+            (_, None) => file.limit(object).ok_or_else(|| {
                 format!("{path} has no limit for {name:?}, since no row of its sweep is stable: {remedy}")
             }),
         })
@@ -194,7 +182,6 @@ fn relative_path(asset: &str) -> String {
     format!("assets/calibration/{asset}.json")
 }
 
-/// Collects the limits of many scenes.
 #[derive(Debug, Default)]
 pub(crate) struct LimitScan {
     scenes: usize,
@@ -243,7 +230,6 @@ impl LimitScan {
     }
 }
 
-/// Calibrations of the assets of a run.
 #[derive(Clone, Debug)]
 pub(crate) struct Calibrations {
     /// τ by asset, %; `None` without a calibration.

@@ -29,7 +29,6 @@ pub trait Observer: Send + Sync {
     fn end(&self) {}
 }
 
-/// Tells nothing.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct SilentObserver;
 

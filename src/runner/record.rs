@@ -25,7 +25,6 @@ use softvt_script::ExpertController;
 const ATTEMPTS_PER_DEMO: u32 = 4;
 const MIN_ATTEMPTS: u32 = 20;
 
-/// Demonstrations to record of each task.
 #[derive(Clone, Copy, Debug)]
 pub struct DemoCount {
     /// Demonstrations that are safe and reach the goal.
@@ -34,20 +33,9 @@ pub struct DemoCount {
     pub attempts: Option<u32>,
 }
 
-impl DemoCount {
-    fn max_attempts(self) -> u32 {
-        let default = self.demos.saturating_mul(ATTEMPTS_PER_DEMO).max(MIN_ATTEMPTS);
-        self.attempts.unwrap_or(default)
-    }
-}
-
 /// Records demonstrations of the selected tasks of every suite of a script, by the policy that `policy_of` returns for
 /// the teacher of the suite. Returns `None` if the folder contains the complete recording. The policy, the output, the
 /// number of episodes, the shard, the trace and the videos of the configuration are ignored.
-///
-/// # Errors
-/// The script has no suite, the folder contains something else, an attempt or a file fails, or too
-/// few attempts are good.
 pub fn record(
     ConfiguredScript { config, script }: &ConfiguredScript,
     policy_of: impl Fn(Teacher) -> PolicyOptions,
@@ -76,7 +64,9 @@ pub fn record(
     let configs: Vec<RunConfig> = suites.iter().map(taught).collect::<Result<_, _>>()?;
     record_all(options, &request, || {
         let prepare = |(suite, config)| {
-            let jobs = EpisodeList::of_tasks(&select_tasks(config, suite)?, count.max_attempts(), None);
+            let default = count.demos.saturating_mul(ATTEMPTS_PER_DEMO).max(MIN_ATTEMPTS);
+            let attempts = count.attempts.unwrap_or(default);
+            let jobs = EpisodeList::of_tasks(&select_tasks(config, suite)?, attempts, None);
             SuiteRecording::new(config, options, script, suite, jobs, Some(count.demos), |run, log| {
                 Ok(record_grips(run, log))
             })
@@ -145,7 +135,7 @@ impl Controller for GripRecorder {
     }
 }
 
-/// What an expert commands in a control step.
+/// Command of an expert in a control step.
 #[derive(Clone, Copy, Debug)]
 struct GripStep {
     is_gripping: bool,

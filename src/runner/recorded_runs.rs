@@ -5,9 +5,11 @@ use std::path::{Path, PathBuf};
 use sha2::{Digest, Sha256};
 
 use crate::{episode_list::EpisodeList, error::RunError};
-use softvt_common::episode_id::{EpisodeIndex, EpisodeSplit};
-use softvt_common::files::FileError;
-use softvt_common::text::hex;
+use softvt_common::{
+    episode_id::{EpisodeIndex, EpisodeSplit},
+    files::FileError,
+    text::hex,
+};
 use softvt_policy::{Action, EpisodeBrief};
 use softvt_runs::{
     actions,
@@ -25,9 +27,6 @@ pub(crate) struct RecordedRuns {
 
 impl RecordedRuns {
     /// Reads a run folder, or all run folders in a folder.
-    ///
-    /// # Errors
-    /// The folder contains no run, or one cannot be read.
     pub(crate) fn load(dir: &Path) -> Result<Self, RunError> {
         let runs = stored_run::load(dir).map_err(|error| RunError::of_setting("policy", "", error))?;
         Ok(Self { dir: dir.to_owned(), runs })
@@ -38,10 +37,6 @@ impl RecordedRuns {
     }
 
     /// The run of a suite whose actions the policy repeats.
-    ///
-    /// # Errors
-    /// The run is of another suite, seed, split or twin, lacks some of the requested episodes, or has actions that are
-    /// not those of their records.
     pub(crate) fn replay_source(
         &self,
         suite: &str,
@@ -59,14 +54,17 @@ impl RecordedRuns {
         })?;
         let refuse = |message: String| Err(RunError::of_setting("policy", run.dir.display(), message));
         let manifest = &run.manifest;
-        if manifest.seed != base_seed {
-            return refuse(format!("its seed is {}, that of this run {base_seed}", manifest.seed));
+        for (what, other, own) in [
+            ("seed", manifest.seed.to_string(), base_seed.to_string()),
+            ("split", manifest.split.name().to_owned(), split.name().to_owned()),
+        ] {
+            if other != own {
+                return refuse(format!("its {what} is {other}, that of this run {own}"));
+            }
         }
-        if manifest.split != split {
-            let (other, own) = (manifest.split.name(), split.name());
-            return refuse(format!("its split is {other}, that of this run {own}"));
-        }
-        let missing = requested.without(episodes_with_actions(run));
+        let recorded = run.records.iter().map(|record| record.header.id.index());
+        let has_actions = |index: &EpisodeIndex| actions::path(&run.dir, *index).is_file();
+        let missing = requested.without(recorded.filter(has_actions));
         if let Some(first) = missing.iter().next() {
             return refuse(format!(
                 "it lacks {} of the {} requested episodes (first: {}); select available tasks and episodes",
@@ -87,10 +85,6 @@ impl RecordedRuns {
         })
     }
 
-    /// The recorded actions of an episode.
-    ///
-    /// # Errors
-    /// The actions cannot be read, or are not those of the record.
     pub(crate) fn actions(
         &self,
         suite: &str,
@@ -112,11 +106,6 @@ fn suite_label(suite: &str, is_twin: bool) -> String {
 
 fn is_rigid_twin(run: &StoredRun) -> bool {
     run.manifest.twin.is_some()
-}
-
-fn episodes_with_actions(run: &StoredRun) -> impl Iterator<Item = EpisodeIndex> {
-    let episodes = run.records.iter().map(|record| record.header.id.index());
-    episodes.filter(|index| actions::path(&run.dir, *index).is_file())
 }
 
 /// SHA-256 of the list of episodes and of the actions of each, in the order of the list.

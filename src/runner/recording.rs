@@ -18,23 +18,21 @@ use crate::{
     config::RunConfig,
     episode_list::{EpisodeJob, EpisodeList},
     error::RunError,
-    evaluate::{RunLog, SimulatedEpisode, with_kept},
+    evaluate::{RunLog, SimulatedEpisode},
     policy::ControllerFactory,
     suite_run::{PreparedRun, SuiteRun},
     suite_selection::path_component,
 };
 use softvt_benchmark::{CONTROL_HZ, Suite, Task};
-use softvt_common::cancel;
-use softvt_common::episode_id::{EpisodeIndex, EpisodeSplit};
 use softvt_common::{
-    files::{self, FileError},
-    parallel,
+    cancel,
+    episode_id::{EpisodeIndex, EpisodeSplit},
+    files, parallel,
     text::counted,
 };
 use softvt_dataset::{
     OptionalStream,
     card::{DatasetCard, KeptOutcome, TaskCount, rejection_counts},
-    check,
     demonstration_writer::DemonstrationWriter,
     layout::{self, DATASET, MANIFEST, PARTS, RECORDING, TaskPaths, VIDEO_STREAMS},
     manifest::{self, ManifestEntry},
@@ -48,6 +46,7 @@ use softvt_runs::{
     json_difference::json_difference,
     manifest::RunManifest,
     record::{DemonstrationOrigin, EpisodeRecord},
+    run_folder::remove_folder_if_present,
 };
 use softvt_scene::InitialStateOverride;
 use softvt_script::LoadedScript;
@@ -55,7 +54,6 @@ use softvt_script::LoadedScript;
 /// Prefix of the error of an attempt that could not start from the state of its demonstration.
 const START_FAILED: &str = "cannot reproduce the initial state: ";
 
-/// Contents and folder of a recording.
 #[derive(Clone, Debug)]
 pub struct RecordingOptions {
     /// Output folder: a new one, or with `resume` that of an interrupted recording.
@@ -64,9 +62,7 @@ pub struct RecordingOptions {
     pub has_images: bool,
     /// True to add the true state: node positions, deformation, contacts, forces.
     pub has_privileged: bool,
-    /// Further streams of the HDF5 files.
     pub streams: BTreeSet<OptionalStream>,
-    /// True to continue an interrupted recording.
     pub resume: bool,
     /// Outcome that an attempt must have to be kept.
     pub keep: KeptOutcome,
@@ -80,7 +76,6 @@ pub type HoldingLog = Arc<Mutex<BTreeMap<EpisodeIndex, Vec<bool>>>>;
 /// A suite that is being recorded: rounds of attempts, the files of the good ones, and one merged file per task.
 pub struct SuiteRecording<'a> {
     options: &'a RecordingOptions,
-    /// The attempts.
     run: PreparedRun<'a>,
     tasks: Vec<&'a Task>,
     /// Name of the suite as a path component.
@@ -94,7 +89,7 @@ pub struct SuiteRecording<'a> {
 }
 
 impl RecordingOptions {
-    /// Adds to a request what it contains beside what every request has.
+    /// Adds the options that not every request has.
     pub(crate) fn describe(&self, request: &mut Value) {
         if !self.streams.is_empty() {
             request["streams"] = json!(self.streams);
@@ -120,24 +115,18 @@ impl<'a> SuiteRecording<'a> {
         demos: Option<u32>,
         customize: impl FnOnce(SuiteRun<'a>, &HoldingLog) -> Result<SuiteRun<'a>, RunError>,
     ) -> Result<Self, RunError> {
-        let script = &loaded.sources.main;
-        if !check::is_script_path(script) {
-            return Err(RunError::input(format!(
-                "{script}: a recording names its script, and its path must not contain \"..\"; make a folder above it the working folder"
-            )));
-        }
         if config.secret.is_some() {
             let message =
                 "a recording has no secret seed: demonstrations would show the episodes of a judged run";
             return Err(config.error(message));
         }
         let folder_name = path_component(&config.suite_name(suite));
-        let out = layout::attempts(&options.out, &folder_name);
         let run = SuiteRun {
+            out: Some(layout::attempts(&options.out, &folder_name)),
             renders_episodes: true,
             // The streams of contact, slip and drop come from the trace.
             records_trace: true,
-            ..SuiteRun::of_split(config, loaded, suite, jobs, out, EpisodeSplit::Demonstration)?
+            ..SuiteRun::new(config, loaded, suite, jobs, EpisodeSplit::Demonstration)?
         };
         let grip_log = HoldingLog::default();
         let run = customize(run, &grip_log)?.prepare()?;
@@ -151,24 +140,15 @@ impl<'a> SuiteRecording<'a> {
     }
 
     /// Records all tasks of the suite, and returns the records of all attempts.
-    ///
-    /// # Errors
-    /// The folder contains other attempts, an attempt or a file fails, or too few attempts are good.
-    /// Finished attempts are kept.
     fn record(&self) -> Result<Vec<EpisodeRecord>, RunError> {
         let mut log = RunLog::open(&self.run, &self.manifest, true)?;
-        let outcome = match self.run_rounds(&mut log) {
-            Err(error) if log.records.is_empty() => {
-                log.discard()?;
-                return Err(error);
-            }
-            outcome => outcome,
+        let (outcome, out) = (self.run_rounds(&mut log), &self.options.out);
+        let kept = |log: &RunLog| {
+            let kept = log.records.iter().filter(|record| self.is_kept(record)).count();
+            format!("{} in {}", counted(kept, "demonstration"), out.display())
         };
+        let mut log = log.end(outcome, kept, out)?;
         log.sort()?;
-        let kept = log.records.iter().filter(|record| self.is_kept(record)).count();
-        let out = &self.options.out;
-        let kept = format!("{} in {}", counted(kept, "demonstration"), out.display());
-        with_kept(outcome, &kept, Some(out))?;
         self.check_demo_counts(&log.records)?;
         log.write_summary()?;
         Ok(log.records)
@@ -176,8 +156,9 @@ impl<'a> SuiteRecording<'a> {
 
     /// Runs attempts until every task has its demonstrations or has used up its attempts.
     fn run_rounds(&self, log: &mut RunLog) -> Result<(), RunError> {
+        let dir = self.run.artifacts().dir;
         let write_actions = |finished: &FinishedEpisode| {
-            let path = actions::path(&self.run.out, finished.record.header.id.index());
+            let path = actions::path(dir, finished.record.header.id.index());
             Ok(actions::write(&path, &finished.actions)?)
         };
         let list = self.run.config.job_list(&format!("recording {}", self.folder_name));
@@ -240,7 +221,7 @@ impl<'a> SuiteRecording<'a> {
     /// from the state of the layout.
     fn run_attempt(&self, job: EpisodeJob) -> Result<FinishedEpisode, RunError> {
         let run = &self.run;
-        let origin = run.origins.get(&job.index());
+        let origin = run.import.origins.get(&job.index());
         let error = match (run.simulate(job, origin, true, &run.controllers, &mut |_| Ok(()))?, origin) {
             (Ok(finished), _) => return Ok(finished),
             (Err(error), Some(origin))
@@ -261,7 +242,6 @@ impl<'a> SuiteRecording<'a> {
             .map_err(|error| run.episode_error(&error))
     }
 
-    /// Paths of the files of a task.
     fn paths(&self, task: usize) -> TaskPaths {
         TaskPaths { root: self.options.out.clone(), suite: self.folder_name.clone(), task }
     }
@@ -297,18 +277,10 @@ impl<'a> SuiteRecording<'a> {
             let parts: Vec<PathBuf> = kept.iter().map(|r| paths.part(r.header.id.episode, "hdf5")).collect();
             merge_parts(&parts, &paths.hdf5(), &self.environment)?;
         }
-        match fs::remove_dir_all(paths.parts()) {
-            Err(error) if error.kind() != ErrorKind::NotFound => {
-                Err(FileError::io("remove", &paths.parts())(error).into())
-            }
-            _ => Ok(()),
-        }
+        Ok(remove_folder_if_present(&paths.parts())?)
     }
 
     /// Checks that every task has its demonstrations.
-    ///
-    /// # Errors
-    /// The tasks that have too few, with the reasons for which attempts were not kept.
     fn check_demo_counts(&self, records: &[EpisodeRecord]) -> Result<(), RunError> {
         let Some(required) = self.demos.map(|demos| demos as usize) else { return Ok(()) };
         let short =
@@ -328,7 +300,7 @@ impl<'a> SuiteRecording<'a> {
         if short.is_empty() {
             return Ok(());
         }
-        Err(self.run.config.error(format!(
+        Err(self.run.config.error(format_args!(
             "{}\nthe good ones are in {}; resume it with more attempts, or fix the expert",
             short.join("\n"),
             self.options.out.display()
@@ -430,16 +402,12 @@ fn attempt_line(record: &EpisodeRecord, keep: KeptOutcome) -> String {
     format!("task {} attempt {}: {result}, {:.1} s simulated", id.task, id.episode, record.stats.time_s)
 }
 
-/// What a recording contains.
 pub struct RecordingSummary {
-    /// Counts by task.
     pub tasks: Vec<TaskCount>,
-    /// File that lists all demonstrations.
     pub manifest: PathBuf,
 }
 
 impl RecordingSummary {
-    /// A line of text for each task.
     pub fn text(&self) -> String {
         let line = |task: &TaskCount| {
             format!(
@@ -475,7 +443,7 @@ pub fn record_all<'a>(
     // Preparation takes long, so a folder that cannot be written to is reported first.
     let prepared = files::create_writable_folder(root).map_err(RunError::from).and_then(|()| prepare());
     let suites = prepared.inspect_err(|_| files::remove_empty_folders(&missing))?;
-    files::replace(&root.join(RECORDING), format!("{request:#}\n"))?;
+    files::write_json(&root.join(RECORDING), request)?;
     let mut records = Vec::new();
     for suite in &suites {
         records.push(suite.record().inspect_err(|_| remove_if_empty(root, &missing))?);
@@ -484,15 +452,9 @@ pub fn record_all<'a>(
 }
 
 /// Checks that a dataset can be recorded into a folder. Returns true if it contains this very recording, complete.
-///
-/// # Errors
-/// The folder contains another recording, something else, or this recording incomplete without `resume`.
 fn check_folder(root: &Path, resume: bool, request: &Value) -> Result<bool, RunError> {
     let path = root.join(RECORDING);
     let refuse = |message: String| Err(RunError::of_setting("out", root.display(), message));
-    if root.exists() && !root.is_dir() {
-        return refuse("not a folder; select a new folder".to_owned());
-    }
     if !path.is_file() {
         let found = fs::read_dir(root).ok().and_then(|mut entries| entries.next()?.ok());
         return match found {
@@ -504,14 +466,7 @@ fn check_folder(root: &Path, resume: bool, request: &Value) -> Result<bool, RunE
         };
     }
     let stored: Value = serde_json::from_str(&files::read_text(&path)?)
-        .map_err(|e| RunError::input(format!("{} is not a softvt recording: {e}", path.display())))?;
-    let kind = |request: &Value| match request.get("imported") {
-        Some(_) => "imported demonstrations",
-        None => "recorded demonstrations",
-    };
-    if kind(&stored) != kind(request) {
-        return refuse(format!("the folder contains {}; select a new folder", kind(&stored)));
-    }
+        .map_err(|e| RunError::input(format_args!("{} is not a softvt recording: {e}", path.display())))?;
     if let Some(difference) = json_difference(&stored, request) {
         return refuse(format!(
             "the folder contains another recording ({difference}); select a new folder, or use its original arguments"
@@ -542,10 +497,6 @@ fn remove_if_empty(root: &Path, missing: &[PathBuf]) {
     }
 }
 
-/// Writes manifest and card.
-///
-/// # Errors
-/// No demonstration was kept, or a file cannot be written.
 fn write_summary(
     options: &RecordingOptions,
     suites: &[SuiteRecording],
@@ -575,7 +526,7 @@ fn write_summary(
             .iter()
             .map(|task| format!("{} task {}: {}", task.suite, task.task, rejection_counts(&task.rejected)))
             .collect();
-        return Err(RunError::input(format!(
+        return Err(RunError::input(format_args!(
             "no demonstration was kept: {}; all attempts are in {}/attempts",
             reasons.join("; "),
             root.display()
@@ -591,7 +542,7 @@ fn write_summary(
         streams: options.streams.clone(),
         keep: options.keep,
         gripper: options.gripper,
-        imported: suites.first().map(|suite| suite.run.imported.clone()).unwrap_or_default(),
+        imported: suites.first().map(|suite| suite.run.import.files.clone()).unwrap_or_default(),
         tasks,
     };
     card.write(root)?;

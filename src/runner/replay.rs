@@ -14,18 +14,12 @@ use crate::{
     observer::Observer,
     policy::{ControllerFactory, PolicyConfig, PolicyOptions, PolicySource},
     stored_scripts::StoredScripts,
-    suite_run::{PreparedRun, SuiteRun},
+    suite_run::{ImportedDemos, PreparedRun, SuiteRun},
     suite_selection::{select_tasks, suites_of},
 };
 use softvt_benchmark::{Suite, seed::SecretSeed};
-use softvt_common::cancel;
-use softvt_common::episode_id::EpisodeIndex;
-use softvt_common::parallel;
-use softvt_dataset::{
-    TaskFile,
-    layout::{DATASET, RECORDING},
-    manifest,
-};
+use softvt_common::{cancel, episode_id::EpisodeIndex, parallel};
+use softvt_dataset::{TaskFile, manifest};
 use softvt_evaluation::verdict::Outcome;
 use softvt_policy::{Action, builtin::RecordedPolicy};
 use softvt_rollout::{ChunkedPolicy, FinishedEpisode, StateRecording};
@@ -62,9 +56,6 @@ pub(crate) fn with_policy_fields(mut simulated: EpisodeRecord, record: &EpisodeR
 }
 
 /// Describes the first difference of two records. `None` if they are byte-identical.
-///
-/// # Errors
-/// A record cannot be written as JSON.
 pub(crate) fn difference(
     recorded: &EpisodeRecord,
     simulated: &EpisodeRecord,
@@ -79,27 +70,20 @@ pub(crate) fn difference(
 pub(crate) struct StoredManifest<'a> {
     /// The file, as messages name it.
     pub path: &'a Path,
-    /// Its manifest.
     pub manifest: &'a RunManifest,
     /// Secret of a judged run, with the file that holds it.
     pub secret: Option<&'a SecretFile>,
-    /// Receiver of progress and messages.
     pub observer: Arc<dyn Observer>,
 }
 
 /// The secret in a seed file.
 pub struct SecretFile {
-    /// The file.
     pub path: PathBuf,
-    /// Its secret.
     pub secret: SecretSeed,
 }
 
 impl StoredManifest<'_> {
     /// Simulates an episode again by its `actions`. The policy fields of the result are copied from `record`.
-    ///
-    /// # Errors
-    /// The scripts have changed since, or the episode cannot be run.
     fn simulate(
         &self,
         record: &EpisodeRecord,
@@ -110,10 +94,6 @@ impl StoredManifest<'_> {
         Ok(FinishedEpisode { record: with_policy_fields(finished.record, record), ..finished })
     }
 
-    /// Simulates an episode again with other controllers.
-    ///
-    /// # Errors
-    /// The scripts have changed since, or the episode cannot be run.
     fn simulate_with(
         &self,
         record: &EpisodeRecord,
@@ -127,10 +107,12 @@ impl StoredManifest<'_> {
         let tasks = select_tasks(&config, suite)?;
         let job = EpisodeJob { task: tasks[0], episode: index.episode };
         let run = SuiteRun {
-            split: self.manifest.split,
             controllers,
-            origins: record.header.origin.iter().map(|origin| (index, (**origin).clone())).collect(),
-            ..SuiteRun::new(&config, &loaded, suite, EpisodeList::listed(vec![job]), PathBuf::new())?
+            import: ImportedDemos {
+                origins: record.header.origin.iter().map(|origin| (index, (**origin).clone())).collect(),
+                files: Vec::new(),
+            },
+            ..SuiteRun::new(&config, &loaded, suite, EpisodeList::listed(vec![job]), self.manifest.split)?
         };
         let run = if keeps_states { run.rendered() } else { run }.prepare()?;
         self.check_sources(&run)?;
@@ -151,9 +133,6 @@ impl StoredManifest<'_> {
     }
 
     /// The secret of the run, if it was judged with one.
-    ///
-    /// # Errors
-    /// The secret is missing, is that of another run, or was given for a run without one.
     fn secret(&self, seed_hash: Option<&str>) -> Result<Option<&SecretSeed>, RunError> {
         let path = self.path.display();
         match (seed_hash, self.secret) {
@@ -164,7 +143,7 @@ impl StoredManifest<'_> {
                 given.path.display(),
                 format!("its hash is {}, that of {path} is {hash}", given.secret.hash()),
             )),
-            (Some(_), None) => Err(RunError::input(format!(
+            (Some(_), None) => Err(RunError::input(format_args!(
                 "{path}: the run was judged with a secret seed; give the file with that seed"
             ))),
             (None, Some(given)) => Err(RunError::of_setting(
@@ -178,7 +157,7 @@ impl StoredManifest<'_> {
     pub(crate) fn suite<'a>(&self, loaded: &'a LoadedScript) -> Result<&'a Suite, RunError> {
         let RunManifest { script, suite: name, .. } = self.manifest;
         let suite = suites_of(&loaded.plan).iter().find(|suite| suite.name == *name);
-        suite.ok_or_else(|| RunError::input(format!("{script} no longer has a suite {name:?}")))
+        suite.ok_or_else(|| RunError::input(format_args!("{script} no longer has a suite {name:?}")))
     }
 
     /// Checks that scripts and thresholds are those of the stored run.
@@ -191,7 +170,7 @@ impl StoredManifest<'_> {
         if changed.is_empty() {
             return Ok(());
         }
-        Err(RunError::input(format!(
+        Err(RunError::input(format_args!(
             "{}: {} changed since the run; restore the earlier version, or run again",
             self.path.display(),
             changed.join(", ")
@@ -221,34 +200,16 @@ pub(crate) fn recorded_manifest(file: &TaskFile) -> Result<RunManifest, RunError
 /// A demonstration: its file, and its number in the file.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct DemoRef {
-    /// The HDF5 file.
     pub file: PathBuf,
-    /// Number of the demonstration in it.
     pub demo: usize,
 }
 
-/// Result of the re-simulation of a demonstration.
 pub struct DemoReplay {
-    /// Hash of the final state.
     pub state_hash: String,
     /// First difference from the recording. `None` if they are byte-identical.
     pub difference: Option<String>,
     /// Goal Success of the re-simulation.
     pub goal_reached: bool,
-}
-
-/// Checks that the recording in a folder is complete.
-///
-/// # Errors
-/// The recording was interrupted.
-pub fn check_complete(path: &Path) -> Result<(), RunError> {
-    if path.is_dir() && path.join(RECORDING).is_file() && !path.join(DATASET).is_file() {
-        return Err(RunError::input(format!(
-            "{}: the recording was interrupted; resume it to complete it",
-            path.display()
-        )));
-    }
-    Ok(())
 }
 
 /// All demonstrations of a dataset folder, or of one HDF5 file.
@@ -269,7 +230,6 @@ pub fn demos_of(path: &Path) -> Result<Vec<DemoRef>, RunError> {
 /// An episode of a run that was simulated again by its recorded actions.
 #[derive(Debug)]
 pub struct EpisodeReplay {
-    /// Task and episode.
     pub index: EpisodeIndex,
     /// Record of the simulation. The fields of the policy are those of the recorded one.
     pub simulated: EpisodeRecord,
@@ -300,9 +260,6 @@ pub fn replay_episode(
 }
 
 /// Simulates demonstrations again by their actions alone.
-///
-/// # Errors
-/// A demonstration cannot be simulated.
 pub fn simulate_demos(demos: &[DemoRef], observer: &Arc<dyn Observer>) -> Result<Vec<DemoReplay>, RunError> {
     let mut replays: BTreeMap<usize, DemoReplay> = BTreeMap::new();
     parallel::run(
@@ -322,9 +279,6 @@ pub fn simulate_demos(demos: &[DemoRef], observer: &Arc<dyn Observer>) -> Result
 }
 
 /// Simulates the episode of a demonstration with the controllers that `controllers` makes from its actions.
-///
-/// # Errors
-/// The demonstration cannot be read or simulated.
 pub(crate) fn simulate_demo_with(
     demo: &DemoRef,
     observer: &Arc<dyn Observer>,

@@ -31,7 +31,7 @@ impl PreparedRun<'_> {
             served: policy.is_client(),
             policy_file: policy.file.clone(),
             replayed: self.replay_source.clone(),
-            imported: self.imported.clone(),
+            imported: self.import.files.clone(),
             replan: policy.replan,
             privileged: self.is_privileged(),
             blind: policy.is_blind_bound(),

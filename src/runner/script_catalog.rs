@@ -1,5 +1,5 @@
-//! What there is to run, in the working folder and in the library of the binary: suites, tasks, assets, policies,
-//! profiles and settings, one JSON object each.
+//! Suites, tasks, assets, policies, profiles and settings of the working folder and of the library of the binary, one
+//! JSON object each.
 
 use std::{collections::BTreeSet, convert::Infallible, path::Path};
 
@@ -54,7 +54,11 @@ pub fn profiles() -> Vec<Value> {
 
 /// Settings, with their defaults and values.
 pub fn settings() -> Vec<Value> {
-    Settings::list().iter().map(setting_row).collect()
+    let row = |setting: &Setting| {
+        let Setting { path, values, about, .. } = setting;
+        json!({ "name": path, "default": setting.default_text(), "values": values, "about": first_of(about) })
+    };
+    Settings::list().iter().map(row).collect()
 }
 
 /// Built-in entries, and Lua files, which are named by their paths.
@@ -73,12 +77,6 @@ fn first_sentence(path: &str) -> String {
     first_of(&comment.join(" ")).to_owned()
 }
 
-fn setting_row(setting: &Setting) -> Value {
-    let Setting { path, values, about, .. } = setting;
-    json!({ "name": path, "default": setting.default_text(), "values": values, "about": first_of(about) })
-}
-
-/// The first sentence of a text.
 fn first_of(text: &str) -> &str {
     text.split_once(". ").map_or(text, |(first, _)| first).trim_end_matches('.')
 }

@@ -12,14 +12,16 @@ use crate::{
     evaluate::{RunLog, episode_line, restore_artifacts, with_kept},
     suite_run::PreparedRun,
 };
-use softvt_common::cancel::{self, CancelFlag};
-use softvt_common::episode_id::{EpisodeId, EpisodeIndex};
-use softvt_common::{parallel::lock, text::counted};
+use softvt_common::{
+    cancel::{self, CancelFlag},
+    episode_id::{EpisodeId, EpisodeIndex},
+    parallel::lock,
+    text::counted,
+};
 use softvt_rollout::FinishedEpisode;
 use softvt_runs::summary::SuiteSummary;
 use softvt_serve::{EpisodeRecorder, RequestError};
 
-/// The run folders of a server.
 pub struct ServedRuns<'a> {
     config: &'a RunConfig,
     runs: Vec<ServedRun<'a>>,
@@ -28,7 +30,6 @@ pub struct ServedRuns<'a> {
     cancel: Arc<CancelFlag>,
 }
 
-/// The run folder of one suite.
 struct ServedRun<'a> {
     run: &'a PreparedRun<'a>,
     /// Episodes that were in the folder when the server started.
@@ -70,7 +71,7 @@ impl<'a> ServedRuns<'a> {
                 // An interrupt ends all episodes.
                 if !cancel::requested() {
                     let (suite, index) = (&id.suite, id.index());
-                    self.config.notice(format!(
+                    self.config.notice(format_args!(
                         "{suite}: {index} will not be recorded: {reason}; a resumed server takes it again"
                     ));
                 }
@@ -89,7 +90,6 @@ impl<'a> ServedRuns<'a> {
         begun.map_err(|error| self.fail(error.into()))
     }
 
-    /// Ends the server after an error.
     fn fail(&self, error: RunError) -> RequestError {
         let message = error.to_string();
         lock(&self.failure).get_or_insert(error);
@@ -129,7 +129,6 @@ impl<'a> ServedRuns<'a> {
         (summaries, with_kept(outcome, &kept, (recorded < requested).then_some(out)))
     }
 
-    /// Removes the folders without episodes and attempts.
     fn discard_empty(self) -> Result<(), RunError> {
         for served in self.runs {
             let log = served.log.into_inner().unwrap_or_else(|log| log.into_inner());
@@ -165,7 +164,7 @@ impl<'a> ServedRun<'a> {
         let message = episode_line(&finished.record);
         let artifacts = run.artifacts();
         log.add(finished, |finished| artifacts.write(finished))?;
-        run.config.notice(format!("{} [{}/{}] {message}", run.name, log.records.len(), run.jobs.len()));
+        run.config.notice(format_args!("{} [{}/{}] {message}", run.name, log.records.len(), run.jobs.len()));
         write_if_complete(run, &mut log)
     }
 }

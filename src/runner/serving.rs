@@ -9,7 +9,7 @@ use crate::{
     error::RunError,
     served_runs::ServedRuns,
     suite_run::{PreparedRun, SuiteRun},
-    suite_selection::{check_distinct_out_dirs, check_parent_folder, no_suites, run_dir, suites_of},
+    suite_selection::{check_folders, no_suites, run_dir, suites_of},
 };
 use softvt_benchmark::{Plan, Suite};
 use softvt_common::{
@@ -24,15 +24,12 @@ use softvt_serve::{AccessRules, RequestError, ServerConfig};
 
 /// A server that clients can reach.
 pub struct SuiteServer {
-    /// Where clients connect.
     pub listener: TcpListener,
-    /// Who may connect.
     pub access: AccessRules,
     /// List of episodes for clients that do not name one.
     pub split: EpisodeSplit,
     /// Largest number of clients at a time.
     pub max_clients: usize,
-    /// Ends the server.
     pub cancel: Arc<CancelFlag>,
 }
 
@@ -71,9 +68,6 @@ impl SuiteServer {
 }
 
 /// The suites with all that their episodes need. Their scenes are checked, completely so if episodes are recorded.
-///
-/// # Errors
-/// A suite, shift, setting, scene or calibration file that is not valid.
 fn prepare_served<'a>(
     ConfiguredScript { config, script: loaded }: &'a ConfiguredScript,
     split: EpisodeSplit,
@@ -81,27 +75,21 @@ fn prepare_served<'a>(
     let suites = suites_of(&loaded.plan);
     let is_list = matches!(loaded.plan, Plan::Suites { .. });
     if config.out.is_some() {
-        check_distinct_out_dirs(config, suites)?;
-    }
-    if is_list {
-        check_parent_folder(config)?;
+        check_folders(config, &loaded.plan)?;
     }
     let mut runs = Vec::new();
     for suite in suites {
         let out = run_dir(config, suite, is_list);
         let has_folder = out.is_some();
+        let mut run = SuiteRun { split, ..SuiteRun::selected(config, loaded, suite, out)? };
         // Without a folder, only privileged clients receive the limits.
-        let reads_limits = config.policy.privileged || has_folder;
-        let run = SuiteRun { split, reads_limits, ..SuiteRun::selected(config, loaded, suite, out)? };
+        run.calibration_files = run.calibration_files.filter(|_| config.policy.privileged || has_folder);
         runs.push(if has_folder { run.prepare()? } else { run.prepare_unrecorded()? });
     }
     Ok(runs)
 }
 
 /// Configuration of a server of prepared runs, which records nothing.
-///
-/// # Errors
-/// A policy without a profile.
 fn server_config<'a>(
     ConfiguredScript { config, script: loaded }: &'a ConfiguredScript,
     runs: &'a [PreparedRun<'a>],
@@ -132,9 +120,6 @@ fn server_config<'a>(
 }
 
 /// The first observation of the first episode. It reports invalid scenes and sensors before a client connects.
-///
-/// # Errors
-/// The scene or a sensor is not valid.
 fn first_observation(config: &RunConfig, server: &ServerConfig) -> Result<Observation, RunError> {
     let first = server.suites.iter().find_map(|suite| Some((suite, suite.tasks.first()?)));
     let (suite, task) = first.ok_or_else(|| RunError::input("there is no task to serve"))?;

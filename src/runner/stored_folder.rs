@@ -76,7 +76,7 @@ fn enter(
         return Ok(path.to_owned());
     }
     let made_in = stored.map_or(String::new(), |folder| format!(" or in {folder}, where it was made"));
-    Err(RunError::input(format!(
+    Err(RunError::input(format_args!(
         "{}: its script {script} is not in the working folder{made_in}; change to the folder that contains it",
         path.display()
     )))

@@ -31,14 +31,12 @@ const MAX_INDEX_BYTES: u64 = 4 << 20;
 /// The scripts and calibrations of a stored run.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct StoredScripts {
-    /// Name of the main file.
     main: String,
     scripts: ScriptFiles,
     /// Calibration files, by path below a project folder.
     calibrations: BTreeMap<String, String>,
 }
 
-/// Contents of the archive.
 #[derive(Serialize, Deserialize)]
 struct Index {
     main: String,
@@ -59,9 +57,6 @@ impl StoredScripts {
     }
 
     /// Runs the main file with its options, and makes its plan.
-    ///
-    /// # Errors
-    /// The script fails.
     pub(crate) fn load(&self, options: &[String]) -> Result<LoadedScript, RunError> {
         Ok(softvt_script::load_files(&self.main, self.scripts.clone(), options)?)
     }
@@ -72,16 +67,13 @@ impl StoredScripts {
     }
 
     /// Writes the archive into a run folder, unless it is there.
-    ///
-    /// # Errors
-    /// It cannot be written.
     pub(crate) fn write(&self, folder: &Path) -> Result<(), RunError> {
         let path = folder.join(SCRIPTS);
         if path.exists() {
             return Ok(());
         }
         let bytes = self.archive().map_err(|error| {
-            RunError::input(format!("{}: the scripts cannot be packed: {error}", path.display()))
+            RunError::input(format_args!("{}: the scripts cannot be packed: {error}", path.display()))
         })?;
         Ok(files::replace(&path, &bytes)?)
     }
@@ -123,9 +115,6 @@ impl StoredScripts {
 
     /// Reads the archive of a run folder; `None` if it has none. `sources` are the SHA-256 of the files by their names,
     /// as `run.json` states them.
-    ///
-    /// # Errors
-    /// It is damaged or too large, or its files are not those of `run.json`.
     pub(crate) fn read(
         folder: &Path,
         sources: &BTreeMap<String, String>,
@@ -168,7 +157,7 @@ impl StoredScripts {
                 scripts.files.insert(name, bytes.into());
             }
             let mut calibrations = BTreeMap::new();
-            // Those of scenes that are no episodes of the run are not listed, and not used.
+            // Calibrations of scenes that are no episodes of the run are not listed, and not used.
             for (name, of) in index.calibrations.into_iter().filter(|(name, _)| sources.contains_key(name)) {
                 let text = String::from_utf8(file(&name, &of)?)?;
                 calibrations.insert(name, text);
@@ -177,7 +166,7 @@ impl StoredScripts {
         };
         let stored = read().map_err(|error| {
             let message = format!("{}: {error}; the archive is damaged, and without it", path.display());
-            RunError::input(format!("{message} the scripts on the disk are used: remove it to do so"))
+            RunError::input(format_args!("{message} the scripts on the disk are used: remove it to do so"))
         })?;
         Ok(Some(Arc::new(stored)))
     }

@@ -3,7 +3,7 @@
 use std::{
     collections::{BTreeMap, BTreeSet},
     ops::Deref,
-    path::PathBuf,
+    path::{Path, PathBuf},
     sync::Arc,
 };
 
@@ -18,68 +18,65 @@ use crate::{
     suite_selection::{select_episodes, select_tasks},
 };
 use softvt_benchmark::{ObjectType, ShiftValue, Suite, Task, settings::Settings};
-use softvt_common::cancel;
-use softvt_common::episode_id::{EpisodeId, EpisodeIndex, EpisodeSplit};
-use softvt_common::{parallel, text::unknown_name};
+use softvt_common::{
+    cancel,
+    episode_id::{EpisodeId, EpisodeIndex, EpisodeSplit},
+    parallel,
+    text::unknown_name,
+};
 use softvt_policy::{EpisodeBrief, PolicyError, SensorStreams, remote::PolicyConnections};
 use softvt_rollout::{
     AssetCache, Episode, EpisodeError, EpisodeSpec, FinishedEpisode, SceneBuildError, Sensors, Simulation,
-    StatePredicate, check_goal, check_sensors, cost_warning, friction_warnings,
+    StatePredicate, check_goal, check_sensors, cost_warning, ineffective_friction,
 };
 use softvt_runs::{
     manifest::{ImportedFile, ReplaySource},
     record::{DemonstrationOrigin, PRIVILEGED_POLICIES},
 };
-use softvt_scene::{Body, Object, Scene};
+use softvt_scene::{Body, Camera, Object, Scene};
 use softvt_script::{EpisodeSetup, LoadedScript, SceneBuilder, SceneChanges};
 
 /// Episodes per task whose scenes are built before a run, to find all assets and the limits that are missing.
 const MAX_SCANNED_EPISODES: usize = 100;
 
-/// Tilt while settling that is told, and that of an object that has fallen over, degrees.
+/// Tilt while settling that is reported, and that of an object that has fallen over, degrees.
 const MAX_TILT_DEG: f64 = 5.0;
 const FALLEN_DEG: f64 = 45.0;
 
 /// A suite with everything that its episodes need: [`SuiteRun::run_episode`] runs single episodes.
 ///
-/// [`SuiteRun::prepare`] checks the scenes and reads the limits. A [`Runner`](super::Runner) does that
-/// and runs all episodes.
+/// [`SuiteRun::prepare`] checks the scenes and reads the limits. [`run_suites`](super::run_suites) does that, and then
+/// runs all episodes of the suite.
 pub struct SuiteRun<'a> {
-    /// Configuration of the run.
     pub config: &'a RunConfig,
-    /// The script of the suite.
     pub loaded: &'a LoadedScript,
-    /// The suite.
     pub suite: &'a Suite,
-    /// Name in results.
     pub name: String,
     /// Settings of the suite with the changes of the run.
     pub settings: Settings,
-    /// The episodes to run.
     pub jobs: EpisodeList<'a>,
-    /// Files with the deformation limits of the objects.
-    pub(crate) calibration_files: Arc<CalibrationFiles>,
-    /// False if objects have no limits, since no verdict is shown.
-    pub(crate) reads_limits: bool,
-    /// The recorded run whose actions are repeated.
+    /// Folder of the run, if it has one.
+    pub out: Option<PathBuf>,
+    pub(crate) split: EpisodeSplit,
+    /// Files with the deformation limits of the objects; `None` if these have none, since no verdict is shown.
+    pub(crate) calibration_files: Option<Arc<CalibrationFiles>>,
     pub(crate) replay_source: Option<ReplaySource>,
     /// Data derived from the objects, shared by all episodes.
     pub(crate) assets: AssetCache,
-    /// Folder of the run.
-    pub out: PathBuf,
     /// True if any episode may be rendered.
     pub(crate) renders_episodes: bool,
     /// True if every control step is recorded.
     pub(crate) records_trace: bool,
-    /// Split of the episodes.
-    pub(crate) split: EpisodeSplit,
     pub(crate) connections: Option<Arc<PolicyConnections>>,
-    /// Demonstrations of other simulators that the episodes re-execute.
-    pub(crate) origins: BTreeMap<EpisodeIndex, DemonstrationOrigin>,
-    /// Files of those demonstrations.
-    pub(crate) imported: Vec<ImportedFile>,
-    /// Makes the controller of an episode.
+    pub(crate) import: ImportedDemos,
     pub controllers: ControllerFactory,
+}
+
+/// Demonstrations of other simulators that the episodes of a run re-execute.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct ImportedDemos {
+    pub origins: BTreeMap<EpisodeIndex, DemonstrationOrigin>,
+    pub files: Vec<ImportedFile>,
 }
 
 /// A run whose scenes are valid, with the limits of their objects.
@@ -102,7 +99,7 @@ impl<'a> Deref for PreparedRun<'a> {
 }
 
 impl<'a> SuiteRun<'a> {
-    /// A run of `jobs` into the folder `out`. Nothing is run or written yet.
+    /// A run of the episodes `jobs` of a split, without a folder. Nothing is run yet.
     ///
     /// # Errors
     /// A setting or shift that does not exist, or whose value is out of range; recorded actions that do not fit.
@@ -111,21 +108,6 @@ impl<'a> SuiteRun<'a> {
         loaded: &'a LoadedScript,
         suite: &'a Suite,
         jobs: EpisodeList<'a>,
-        out: PathBuf,
-    ) -> Result<Self, RunError> {
-        Self::of_split(config, loaded, suite, jobs, out, EpisodeSplit::Validation)
-    }
-
-    /// As [`SuiteRun::new`], of the episodes of a split.
-    ///
-    /// # Errors
-    /// As [`SuiteRun::new`].
-    pub fn of_split(
-        config: &'a RunConfig,
-        loaded: &'a LoadedScript,
-        suite: &'a Suite,
-        jobs: EpisodeList<'a>,
-        out: PathBuf,
         split: EpisodeSplit,
     ) -> Result<Self, RunError> {
         let settings = suite.settings.with_all(&config.settings);
@@ -136,6 +118,8 @@ impl<'a> SuiteRun<'a> {
         }
         let replay_source = find_replay_source(config, suite, &jobs, split)?;
         let connections = config.policy.connections();
+        let controllers =
+            config.policy.controller_factory(connections.clone(), &suite.name, config.rigid_twin);
         Ok(Self {
             config,
             loaded,
@@ -143,41 +127,28 @@ impl<'a> SuiteRun<'a> {
             name: config.suite_name(suite),
             settings,
             jobs,
-            calibration_files: Arc::new(CalibrationFiles::new(
-                &config.file,
-                config.stored_scripts.clone(),
-                config.observer.clone(),
-            )),
-            reads_limits: true,
+            out: None,
+            split,
+            calibration_files: Some(Arc::new(CalibrationFiles::new(config))),
             replay_source,
             assets: loaded.sources.assets.clone(),
-            out,
             renders_episodes: config.video.is_some() || config.mcap.is_some(),
             records_trace: config.trace.is_some(),
-            split,
-            controllers: config.policy.controller_factory(
-                connections.clone(),
-                &suite.name,
-                config.rigid_twin,
-            ),
             connections,
-            origins: BTreeMap::new(),
-            imported: Vec::new(),
+            import: ImportedDemos::default(),
+            controllers,
         })
     }
 
     /// A run of the tasks and episodes that the configuration selects, into the folder `out` if there is one.
-    ///
-    /// # Errors
-    /// As [`SuiteRun::new`]; a task that does not exist.
-    pub fn selected(
+    pub(crate) fn selected(
         config: &'a RunConfig,
         loaded: &'a LoadedScript,
         suite: &'a Suite,
         out: Option<PathBuf>,
     ) -> Result<Self, RunError> {
         let jobs = select_episodes(config, suite, &select_tasks(config, suite)?);
-        Self::new(config, loaded, suite, jobs, out.unwrap_or_default())
+        Ok(Self { out, ..Self::new(config, loaded, suite, jobs, EpisodeSplit::Validation)? })
     }
 
     /// The same run, of which every episode can be rendered.
@@ -193,7 +164,6 @@ impl<'a> SuiteRun<'a> {
         Ok(EpisodeSetup::open(self.loaded, id, &self.changes())?)
     }
 
-    /// Changes of all scenes of the run.
     pub fn changes(&self) -> SceneChanges {
         SceneChanges {
             shifts: self.config.shifts.clone(),
@@ -202,20 +172,15 @@ impl<'a> SuiteRun<'a> {
         }
     }
 
-    /// Name of an episode of a judged run.
-    fn alias(&self, task: &Task, episode: u32) -> Option<String> {
-        let secret = self.config.secret.as_ref()?;
-        Some(secret.episode_name(&self.name, task.id, episode))
-    }
-
     pub(crate) fn brief(&self, task: &Task, episode: u32) -> EpisodeBrief {
+        let secret = self.config.secret.as_ref();
         EpisodeBrief {
             suite: self.name.clone(),
             task: task.id,
             prompt: task.prompt.clone(),
             episode,
             seed: self.config.base_seed(),
-            alias: self.alias(task, episode),
+            alias: secret.map(|secret| secret.episode_name(&self.name, task.id, episode)),
         }
     }
 
@@ -240,38 +205,26 @@ impl<'a> SuiteRun<'a> {
     }
 
     /// Limits of the objects in the scene of an episode.
-    ///
-    /// # Errors
-    /// A calibration file that is not valid.
     pub(crate) fn limits_of(&self, task: &Task, scene: &Scene) -> Result<SceneLimits, RunError> {
-        match self.reads_limits {
-            true => self.calibration_files.limits_of(scene, &task.targets()),
-            false => Ok(SceneLimits::default()),
+        match &self.calibration_files {
+            Some(files) => files.limits_of(scene, &task.targets()),
+            None => Ok(SceneLimits::default()),
         }
     }
 
-    /// Tells which objects of the first episode of each task have no limit.
-    ///
-    /// # Errors
-    /// A scene or calibration file that is not valid.
-    fn report_limits(&self) -> Result<(), RunError> {
-        for task in self.jobs.tasks() {
-            let opened = self.open_episode(&self.episode_id(task, 0))?;
-            let limits = self.limits_of(task, &opened.scene)?;
-            self.calibration_files.report(EpisodeIndex { task: task.id, episode: 0 }, &limits);
+    /// The same, with messages about objects that have none.
+    fn reported_limits(&self, task: &Task, episode: u32, scene: &Scene) -> Result<SceneLimits, RunError> {
+        let limits = self.limits_of(task, scene)?;
+        if let Some(files) = &self.calibration_files {
+            files.report(EpisodeIndex { task: task.id, episode }, &limits);
         }
-        Ok(())
+        Ok(limits)
     }
 
     /// Builds the scenes of the first episodes of each task, returns the calibrations of their assets, and reports
     /// objects without a limit. A layout that fails ends the scan of its task; the episode itself reports the error.
-    ///
-    /// # Errors
-    /// A calibration file that is not valid.
     pub(crate) fn scan_limits(&self) -> Result<Calibrations, RunError> {
-        if !self.reads_limits {
-            return Ok(Calibrations::default());
-        }
+        let Some(files) = &self.calibration_files else { return Ok(Calibrations::default()) };
         let tasks = self.jobs.tasks();
         let mut scan = LimitScan::default();
         parallel::run(
@@ -284,8 +237,8 @@ impl<'a> SuiteRun<'a> {
                 Ok(())
             },
         )?;
-        scan.report(&self.calibration_files);
-        Ok(scan.calibrations(&self.calibration_files))
+        scan.report(files);
+        Ok(scan.calibrations(files))
     }
 
     /// Limits in the first episodes of a task. All shards of a run look at the same episodes.
@@ -296,8 +249,8 @@ impl<'a> SuiteRun<'a> {
             None => of_task.take(MAX_SCANNED_EPISODES).collect(),
         };
         let (mut found, changes) = (BTreeMap::new(), self.changes());
-        // Errors are told when the episode is run. The episodes of a task share a virtual machine, in their order, so
-        // that what it keeps of one for the next does not depend on threads.
+        // Errors are reported when the episode is run. The episodes of a task share a virtual machine, in their order,
+        // so that what it keeps of one for the next does not depend on threads.
         let Ok(builder) = SceneBuilder::open(self.loaded) else { return Ok(found) };
         for episode in episodes {
             let Ok(opened) = builder.build(&self.episode_id(task, episode), &changes) else { break };
@@ -309,7 +262,8 @@ impl<'a> SuiteRun<'a> {
     /// Files of the episodes, other than their lines in `episodes.jsonl`.
     pub(crate) fn artifacts(&self) -> EpisodeArtifacts<'_> {
         let RunConfig { trace, video, mcap, .. } = self.config;
-        EpisodeArtifacts { dir: &self.out, trace: *trace, video: video.as_ref(), mcap: mcap.as_ref() }
+        let dir = self.out.as_deref().unwrap_or(Path::new(""));
+        EpisodeArtifacts { dir, trace: *trace, video: video.as_ref(), mcap: mcap.as_ref() }
     }
 
     /// Runs one episode, from the start of its foreign demonstration if it has one. With `keep_states` the
@@ -323,17 +277,13 @@ impl<'a> SuiteRun<'a> {
         keep_states: bool,
         controllers: &ControllerFactory,
     ) -> Result<FinishedEpisode, RunError> {
-        let origin = self.origins.get(&job.index());
+        let origin = self.import.origins.get(&job.index());
         let run = self.simulate(job, origin, keep_states, controllers, &mut |_| Ok(()))?;
         run.map_err(|error| self.episode_error(&error))
     }
 
     /// Runs one episode from the start of a foreign demonstration, or from that of the layout, and calls `watch` as
     /// [`Episode::run_watched`] does.
-    ///
-    /// # Errors
-    /// The script or the controller does not start. The inner result: the scene is not valid, or the episode or
-    /// `watch` fails.
     pub(crate) fn simulate(
         &self,
         job: EpisodeJob<'_>,
@@ -351,9 +301,6 @@ impl<'a> SuiteRun<'a> {
     }
 
     /// Runs one episode, and calls `watch` in its settled state and after each control step ([`Episode::run_watched`]).
-    ///
-    /// # Errors
-    /// As [`Self::run_episode`], and those of `watch`.
     pub fn run_episode_watched(
         &self,
         job: EpisodeJob<'_>,
@@ -364,9 +311,6 @@ impl<'a> SuiteRun<'a> {
     }
 
     /// Starts an episode for an external client: settled, without a controller.
-    ///
-    /// # Errors
-    /// The script or the scene fails.
     pub fn start_episode(&self, task: &Task, id: &EpisodeId) -> Result<Episode, RunError> {
         let (spec, _) = self.spec(task, id, None)?;
         Episode::start(spec, &self.assets).map_err(|e| self.episode_error(&e))
@@ -383,8 +327,7 @@ impl<'a> SuiteRun<'a> {
         if let Some(origin) = origin {
             origin.start.apply(&mut opened.scene);
         }
-        let limits = self.limits_of(task, &opened.scene)?;
-        self.calibration_files.report(id.index(), &limits);
+        let limits = self.reported_limits(task, id.episode, &opened.scene)?;
         let id = EpisodeId { suite: self.name.clone(), ..id.clone() };
         let (policy, scene) = (&self.config.policy.name, opened.scene.clone());
         let task_prompt = task.prompt_varies.then(|| task.prompt.clone());
@@ -428,38 +371,33 @@ impl<'a> SuiteRun<'a> {
         self.config.observer.work(&format!("checking the scenes of {}", self.name));
         let force_observed = self.check_first_episodes()?;
         let calibrations = self.scan_limits()?;
-        let mut sources = self.sources();
-        sources.extend(calibrations.sources.clone());
         self.config.observer.end();
-        Ok(PreparedRun { run: self, calibrations, sources, force_observed })
+        Ok(self.prepared(calibrations, force_observed))
     }
 
     /// As [`Self::prepare`], with the limits of another run of the same suite, whose layouts are the same.
-    ///
-    /// # Errors
-    /// A layout, camera, light or tactile sensor that is not valid; a server that cannot be reached.
     pub(crate) fn prepare_like(self, other: &PreparedRun) -> Result<PreparedRun<'a>, RunError> {
         let run = Self { calibration_files: other.calibration_files.clone(), ..self };
         let force_observed = run.check_first_episodes()?;
-        let (calibrations, sources) = (other.calibrations.clone(), other.sources.clone());
-        Ok(PreparedRun { run, calibrations, sources, force_observed })
+        Ok(run.prepared(other.calibrations.clone(), force_observed))
     }
 
     /// Tells which objects have no limit, for episodes that are not recorded. Scenes are checked when they are opened.
-    ///
-    /// # Errors
-    /// A scene or calibration file that is not valid.
+    #[cfg(feature = "serve")]
     pub(crate) fn prepare_unrecorded(self) -> Result<PreparedRun<'a>, RunError> {
-        self.report_limits()?;
-        let (sources, force_observed) = (self.sources(), self.observes_recorded_force());
-        Ok(PreparedRun { run: self, calibrations: Calibrations::default(), sources, force_observed })
+        for task in self.jobs.tasks() {
+            let opened = self.open_episode(&self.episode_id(task, 0))?;
+            self.reported_limits(task, 0, &opened.scene)?;
+        }
+        let force_observed = self.observes_recorded_force();
+        Ok(self.prepared(Calibrations::default(), force_observed))
     }
 
-    /// SHA-256 of every file of the script and the policy, by name.
-    fn sources(&self) -> BTreeMap<String, String> {
+    fn prepared(self, calibrations: Calibrations, force_observed: bool) -> PreparedRun<'a> {
         let mut sources = self.loaded.file_hashes();
         sources.extend(self.config.policy.sources.clone());
-        sources
+        sources.extend(calibrations.sources.clone());
+        PreparedRun { run: self, calibrations, sources, force_observed }
     }
 
     /// True if the policy whose actions are repeated observed the true forces on the pads.
@@ -477,11 +415,10 @@ impl<'a> SuiteRun<'a> {
             let opened = self.open_episode(&self.episode_id(task, first))?;
             has_changed |= opened.is_shifted();
             if self.suite.vary.is_some() || !self.config.shifts.is_empty() {
-                warnings.extend(self.friction_warnings(&opened));
+                warnings.extend(self.ineffective_friction(&opened));
             }
-            self.check_object_type(task, &opened.nominal)?;
             let scene = Arc::new(opened.scene.clone());
-            self.check_declared_cameras(&scene, task)?;
+            self.check_declared(task, &opened.nominal, &scene.cameras)?;
             if let Some(connections) = &self.connections {
                 connections.check().map_err(policy_failure)?;
             }
@@ -498,15 +435,15 @@ impl<'a> SuiteRun<'a> {
         }
         // One warning suffices: the others repeat it for other objects.
         if let Some(warning) = warnings.first() {
-            self.config.notice(format!("warning: {warning}"));
+            self.config.notice(format_args!("warning: {warning}"));
         }
         Ok(force_observed)
     }
 
     /// Warnings about friction that the episode sets without effect.
-    pub(crate) fn friction_warnings(&self, opened: &EpisodeSetup) -> Vec<String> {
+    pub(crate) fn ineffective_friction(&self, opened: &EpisodeSetup) -> Vec<String> {
         let variation = self.suite.vary.as_ref().zip(opened.variation.as_ref());
-        friction_warnings(&opened.scene, &opened.nominal, variation, self.settings.robot.pads.static_mu)
+        ineffective_friction(&opened.scene, &opened.nominal, variation, self.settings.robot.pads.static_mu)
     }
 
     /// Refuses shifts that change neither the scene nor the prompt of any task, unless their values
@@ -538,8 +475,7 @@ impl<'a> SuiteRun<'a> {
         scene: Scene,
         predicates: Vec<Arc<dyn StatePredicate>>,
     ) -> Result<Vec<String>, RunError> {
-        self.check_object_type(task, &scene)?;
-        self.check_declared_cameras(&scene, task)?;
+        self.check_declared(task, &scene, &scene.cameras)?;
         let scene = Arc::new(scene);
         let settings = &self.settings;
         let sense = |source| EpisodeError::Sense { task: task.id, episode, source };
@@ -549,8 +485,7 @@ impl<'a> SuiteRun<'a> {
             sim.check_support()?;
             let goal = check_goal(task, &sim, &self.assets, &predicates)?;
             if goal.may_hold {
-                // Whether it holds is known once the scene has settled, with masses and contacts that are not
-                // approximate.
+                // The settled scene decides, with masses and contacts that are not approximate.
                 let id = self.episode_id(task, episode);
                 let spec = EpisodeSpec::new(id, "noop", task, &scene, Scene::clone(&scene), settings);
                 let spec = EpisodeSpec { predicates: predicates.clone(), ..spec };
@@ -570,9 +505,6 @@ impl<'a> SuiteRun<'a> {
     }
 
     /// Lets a scene settle. Returns warnings about objects that tilt.
-    ///
-    /// # Errors
-    /// The scene does not come to rest.
     pub fn settle_scene(
         &self,
         EpisodeJob { task, episode }: EpisodeJob,
@@ -597,32 +529,29 @@ impl<'a> SuiteRun<'a> {
         Ok(tilts.filter(|(_, tilt)| *tilt > MAX_TILT_DEG).map(warning).collect())
     }
 
-    /// Checks that the scene has the cameras that the file of the policy declares.
-    fn check_declared_cameras(&self, scene: &Scene, task: &Task) -> Result<(), RunError> {
-        let Some(DeclaredStreams { place, streams }) = &self.config.policy.declared else { return Ok(()) };
-        let missing = streams.cameras.iter().find(|name| scene.camera(name).is_none());
-        missing.map_or(Ok(()), |name| {
-            let known = scene.cameras.iter().map(|camera| camera.name.as_str());
-            let unknown = unknown_name("camera", name, known);
-            Err(RunError::input(format!("{place}: {unknown} (scene of task {})", task.id)))
-        })
-    }
-
-    /// Checks that a suite of rigid objects, whose tables have no deformation, has no soft target.
-    fn check_object_type(&self, task: &Task, scene: &Scene) -> Result<(), RunError> {
-        if self.suite.object_type != ObjectType::Rigid || self.config.rigid_twin {
-            return Ok(());
-        }
+    /// Checks that a scene has the cameras that the file of the policy declares and, in a suite of rigid objects, whose
+    /// tables have no deformation, no soft target.
+    fn check_declared(&self, task: &Task, scene: &Scene, cameras: &[Camera]) -> Result<(), RunError> {
         let names = task.targets();
-        let is_target = |object: &&Object| names.contains(&object.name.as_str());
-        let mut soft = scene.objects.iter().filter(|object| matches!(object.asset.body, Body::Soft(_)));
-        match soft.find(is_target) {
-            None => Ok(()),
-            Some(target) => Err(RunError::input(format!(
+        let is_soft_target = |object: &&Object| {
+            matches!(object.asset.body, Body::Soft(_)) && names.contains(&object.name.as_str())
+        };
+        let is_rigid = self.suite.object_type == ObjectType::Rigid && !self.config.rigid_twin;
+        if let Some(target) = scene.objects.iter().find(is_soft_target).filter(|_| is_rigid) {
+            return Err(RunError::input(format_args!(
                 "{}: the target of task {}, {}, is soft, but suite {} has object_type = \"rigid\"; set \
                  \"deformable\"",
                 target.placed_at, task.id, target.name, self.suite.name
-            ))),
+            )));
+        }
+        let Some(DeclaredStreams { place, streams }) = &self.config.policy.declared else { return Ok(()) };
+        let known = || cameras.iter().map(|camera| camera.name.as_str());
+        match streams.cameras.iter().find(|name| !known().any(|camera| camera == *name)) {
+            None => Ok(()),
+            Some(name) => {
+                let unknown = unknown_name("camera", name, known());
+                Err(RunError::input(format_args!("{place}: {unknown} (scene of task {})", task.id)))
+            }
         }
     }
 
@@ -646,14 +575,11 @@ impl<'a> SuiteRun<'a> {
         }
         let sim = Simulation::new(scene, &settings.physics, &settings.robot, &self.assets)?;
         let mut sensors = Sensors::new(&sim, &settings.tactile, &self.assets);
-        sensors.validate(&Sensors::frame(&sim), &streams).map_err(sense)
+        sensors.compute_once(&Sensors::frame(&sim), &streams).map_err(sense)
     }
 }
 
 /// Returns the recorded run whose actions `--policy` repeats, if it names one.
-///
-/// # Errors
-/// The run is of another suite, seed, split or twin, or lacks episodes.
 pub(crate) fn find_replay_source(
     config: &RunConfig,
     suite: &Suite,
@@ -666,7 +592,6 @@ pub(crate) fn find_replay_source(
     config.policy.recorded().map(source).transpose()
 }
 
-/// Converts the error of a policy server.
 pub(crate) fn policy_failure(error: PolicyError) -> RunError {
     match error {
         PolicyError::Interrupted => RunError::input(error),

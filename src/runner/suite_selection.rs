@@ -26,14 +26,16 @@ pub(crate) fn no_suites(config: &RunConfig) -> RunError {
     config.error("expected a suite or a list of suites; name a file that returns softvt.suite")
 }
 
-/// The suites of a plan, each with a folder of its own.
+/// The suites of a plan that is a suite or a list of suites, each with a folder of its own.
 ///
 /// # Errors
 /// The plan is neither a suite nor a list of suites with distinct folders.
 pub fn select_suites<'a>(config: &RunConfig, plan: &'a Plan) -> Result<&'a [Suite], RunError> {
-    let suites = suites_of(plan);
-    check_distinct_out_dirs(config, suites)?;
-    if matches!(plan, Plan::Suite(_) | Plan::Suites { .. }) { Ok(suites) } else { Err(no_suites(config)) }
+    if !matches!(plan, Plan::Suite(_) | Plan::Suites { .. }) {
+        return Err(no_suites(config));
+    }
+    check_folders(config, plan)?;
+    Ok(plan.suites())
 }
 
 /// The tasks that [`RunConfig::tasks`] selects, in the order of their indices.
@@ -88,35 +90,24 @@ pub fn select_episodes<'a>(config: &RunConfig, suite: &Suite, tasks: &[&'a Task]
     EpisodeList::listed(tasks.iter().flat_map(jobs))
 }
 
-/// Checks that every suite gets an output folder of its own.
-///
-/// # Errors
-/// Two suites whose names become the same path component.
-pub fn check_distinct_out_dirs(config: &RunConfig, suites: &[Suite]) -> Result<(), RunError> {
+/// Checks that every suite of a plan gets a folder of its own, below [`RunConfig::out`] unless it is the only one.
+pub fn check_folders(config: &RunConfig, plan: &Plan) -> Result<(), RunError> {
     let mut folders = BTreeSet::new();
-    let duplicate = suites.iter().find(|suite| !folders.insert(path_component(&suite.name)));
-    duplicate.map_or(Ok(()), |suite| {
-        Err(config.error(format!(
+    if let Some(suite) = plan.suites().iter().find(|suite| !folders.insert(path_component(&suite.name))) {
+        return Err(config.error(format_args!(
             "suite {:?} and another suite share the folder {:?}; rename one",
             suite.name,
             path_component(&suite.name)
-        )))
-    })
+        )));
+    }
+    let parent = config.out.as_ref().filter(|_| !matches!(plan, Plan::Suite(_)));
+    parent.map_or(Ok(()), |dir| RunFolder::check_parent(dir).map_err(|error| config.error(error)))
 }
 
 /// Folder of a suite's run in [`RunConfig::out`]: that folder itself, or one inside of it for a list of suites.
 pub(crate) fn run_dir(config: &RunConfig, suite: &Suite, is_list: bool) -> Option<PathBuf> {
     let dir = config.out.as_ref()?;
     Some(if is_list { dir.join(path_component(&config.suite_name(suite))) } else { dir.clone() })
-}
-
-/// Checks [`RunConfig::out`] of a plan that writes several run folders.
-///
-/// # Errors
-/// The folder holds something other than runs.
-pub fn check_parent_folder(config: &RunConfig) -> Result<(), RunError> {
-    let Some(dir) = &config.out else { return Ok(()) };
-    RunFolder::check_parent(dir).map_err(|error| config.error(error))
 }
 
 /// Replaces characters of a name that a script could use to leave the output folder.
@@ -135,37 +126,26 @@ pub fn next_run_dir(config: &RunConfig, name: &str) -> PathBuf {
 
 /// Checks that every suite has the episodes that are to become videos, and that recorded actions cover
 /// all of its episodes.
-///
-/// # Errors
-/// The first suite that lacks an episode.
 pub(crate) fn check_episodes(config: &RunConfig, suites: &[Suite]) -> Result<(), RunError> {
     for suite in suites {
-        check_filter(config, suite, "video", config.video.as_ref())?;
-        check_filter(config, suite, "mcap", config.mcap.as_ref())?;
+        for (setting, filter) in [("video", &config.video), ("mcap", &config.mcap)] {
+            let Some(EpisodeFilter::Episodes(selected)) = filter else { continue };
+            let is_beyond = |episode: &&u32| !config.runs_episode(suite, **episode);
+            let Some(beyond) = selected.iter().find(is_beyond) else { continue };
+            let available = match &config.selected_episodes[..] {
+                [] => format!("the episodes below {}", config.episodes_of(suite)),
+                selected => format!("only the episodes {selected:?}"),
+            };
+            let message = format!(
+                "suite {} runs {available} of each task; select one of them, or run others",
+                suite.name
+            );
+            return Err(config.error_of(setting, beyond, message));
+        }
     }
     for suite in suites.iter().filter(|_| config.policy.recorded().is_some()) {
         let jobs = select_episodes(config, suite, &select_tasks(config, suite)?);
         find_replay_source(config, suite, &jobs, EpisodeSplit::Validation)?;
     }
     Ok(())
-}
-
-/// Checks the episodes that `filter`, the value of `setting`, selects.
-fn check_filter(
-    config: &RunConfig,
-    suite: &Suite,
-    setting: &'static str,
-    filter: Option<&EpisodeFilter>,
-) -> Result<(), RunError> {
-    let Some(EpisodeFilter::Episodes(selected)) = filter else { return Ok(()) };
-    let Some(beyond) = selected.iter().find(|episode| !config.runs_episode(suite, **episode)) else {
-        return Ok(());
-    };
-    let available = match &config.selected_episodes[..] {
-        [] => format!("the episodes below {}", config.episodes_of(suite)),
-        selected => format!("only the episodes {selected:?}"),
-    };
-    let message =
-        format!("suite {} runs {available} of each task; select one of them, or run others", suite.name);
-    Err(config.error_of(setting, beyond, message))
 }

@@ -1,6 +1,6 @@
 //! Small pictures of the objects of stored runs, for their report.
 
-use std::{collections::BTreeMap, path::PathBuf, sync::Arc};
+use std::{collections::BTreeMap, sync::Arc};
 
 use crate::{
     config::{ConfiguredScript, RunConfig},
@@ -50,14 +50,8 @@ fn of_run(
     }
     let ConfiguredScript { config, script } = config.load()?;
     let suite = stored.suite(&script)?;
-    let scenes = SuiteRun::of_split(
-        &config,
-        &script,
-        suite,
-        EpisodeList::listed(Vec::new()),
-        PathBuf::new(),
-        run.manifest.split,
-    )?;
+    let none = EpisodeList::listed(Vec::new());
+    let scenes = SuiteRun::new(&config, &script, suite, none, run.manifest.split)?;
     let mut pictures = Thumbnails::new();
     for (asset, record) in episodes {
         let index = record.header.id.index();

@@ -8,12 +8,12 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use super::record::EpisodeRecord;
-use softvt_common::episode_id::EpisodeIndex;
+use super::{record::EpisodeRecord, run_folder::RunFolderError};
 use softvt_common::{
     digest::sha256_hex,
+    episode_id::EpisodeIndex,
     files::{FileError, replace},
-    npy::{NpyArray, NpyError},
+    npy::NpyArray,
 };
 use softvt_policy::{Action, GripTarget};
 use softvt_robot::panda::ARM_DOFS;
@@ -24,26 +24,6 @@ const WIDTH_WITH_FORCE: usize = 8;
 const WIDTH_WITH_JOINTS: usize = WIDTH_WITH_FORCE + ARM_DOFS;
 /// Grip force of an action that commands a closure.
 const NO_FORCE: f64 = -1.0;
-
-/// Error of reading recorded actions.
-#[allow(missing_docs, reason = "the messages describe the variants")]
-#[derive(Debug, thiserror::Error)]
-pub enum ActionsError {
-    #[error(transparent)]
-    Io(#[from] FileError),
-    #[error("{path}: {source}; expected float64 numbers of shape (steps, 7), as softvt writes them")]
-    Npy { path: String, source: NpyError },
-    #[error(
-        "{path}: an array of type {dtype} and shape {shape:?}; expected float64 numbers of shape (steps, 7)"
-    )]
-    Shape { path: String, dtype: String, shape: Vec<usize> },
-    #[error("{path}: it holds a number that is not finite")]
-    NotFinite { path: String },
-    #[error(
-        "{path}: its SHA-256 differs from that in the record of the episode: the file was changed or damaged"
-    )]
-    Digest { path: String },
-}
 
 /// SHA-256 of the numbers of actions as little-endian float64, hexadecimal.
 pub fn sha256(actions: &[Action]) -> String {
@@ -57,10 +37,6 @@ pub fn path(dir: &Path, index: EpisodeIndex) -> PathBuf {
     dir.join(format!("actions/task_{task:03}/episode_{episode:05}.npy"))
 }
 
-/// Writes the actions of an episode.
-///
-/// # Errors
-/// The file cannot be written.
 pub fn write(path: &Path, actions: &[Action]) -> Result<(), FileError> {
     let width = match actions {
         _ if actions.iter().any(|action| action.joints.is_some()) => WIDTH_WITH_JOINTS,
@@ -76,20 +52,22 @@ pub fn write(path: &Path, actions: &[Action]) -> Result<(), FileError> {
     replace(path, NpyArray::from_f64(vec![actions.len(), width], numbers).to_npy())
 }
 
-/// Reads the actions of an episode.
-///
 /// # Errors
 /// The file cannot be read or is not such an array.
-pub fn read(path: &Path) -> Result<Vec<Action>, ActionsError> {
+pub fn read(path: &Path) -> Result<Vec<Action>, RunFolderError> {
+    const EXPECTED: &str = "expected float64 numbers of shape (steps, 7)";
     let bytes = fs::read(path).map_err(FileError::io("read", path))?;
-    let path = path.display().to_string();
-    let array = match NpyArray::parse(&bytes) {
-        Ok(array) => array,
-        Err(source) => return Err(ActionsError::Npy { path, source }),
-    };
+    let path = path.display();
+    let array = NpyArray::parse(&bytes).map_err(|error| {
+        RunFolderError::new(format_args!("{path}: {error}; {EXPECTED}, as softvt writes them"))
+    })?;
     let width = match array.shape[..] {
         [_, width @ (WIDTH | WIDTH_WITH_FORCE | WIDTH_WITH_JOINTS)] if array.dtype == "<f8" => width,
-        _ => return Err(ActionsError::Shape { path, dtype: array.dtype, shape: array.shape }),
+        _ => {
+            let (dtype, shape) = (&array.dtype, &array.shape);
+            let found = format_args!("{path}: an array of type {dtype} and shape {shape:?}; {EXPECTED}");
+            return Err(RunFolderError::new(found));
+        }
     };
     let action = |row: &[f64]| {
         let closing = Action::from_array(std::array::from_fn(|i| row[i]));
@@ -103,19 +81,22 @@ pub fn read(path: &Path) -> Result<Vec<Action>, ActionsError> {
         action.numbers().all(f64::is_finite).then_some(action)
     };
     let actions: Option<Vec<Action>> = array.values().chunks_exact(width).map(action).collect();
-    actions.ok_or(ActionsError::NotFinite { path })
+    actions.ok_or_else(|| RunFolderError::new(format_args!("{path}: it holds a number that is not finite")))
 }
 
 /// Reads the actions of an episode below the run folder `dir`, which must be those of its record.
 ///
 /// # Errors
 /// The file is missing, cut or changed.
-pub fn read_checked(dir: &Path, record: &EpisodeRecord) -> Result<Vec<Action>, ActionsError> {
+pub fn read_checked(dir: &Path, record: &EpisodeRecord) -> Result<Vec<Action>, RunFolderError> {
     let path = path(dir, record.header.id.index());
     let actions = read(&path)?;
     match record.stats.actions_sha256 == sha256(&actions) {
         true => Ok(actions),
-        false => Err(ActionsError::Digest { path: path.display().to_string() }),
+        false => Err(RunFolderError::new(format_args!(
+            "{}: its SHA-256 differs from that in the record of the episode: the file was changed or damaged",
+            path.display()
+        ))),
     }
 }
 
@@ -156,17 +137,9 @@ mod tests {
         write(&at, &actions).unwrap();
         assert!(at.ends_with("actions/task_003/episode_00012.npy"));
         assert_eq!(read(&at).unwrap(), actions);
-        let whole = fs::read(&at).unwrap();
-        assert_eq!((whole.len() - 5 * 56) % 64, 0);
-        for (bytes, words) in [
-            (&whole[..whole.len() - 1], "279 bytes do not fill the shape [5, 7]"),
-            (&whole[..9], "header is cut off"),
-            (b"hello", "not an .npy array"),
-        ] {
-            fs::write(&at, bytes).unwrap();
-            let error = read(&at).unwrap_err().to_string();
-            assert!(error.contains(words) && error.contains("episode_00012.npy"), "{error}");
-        }
+        fs::write(&at, b"hello").unwrap();
+        let error = read(&at).unwrap_err().to_string();
+        assert!(error.contains("not an .npy array") && error.contains("episode_00012.npy"), "{error}");
         write(&at, &[]).unwrap();
         assert_eq!(read(&at).unwrap(), []);
         let forces = [GripTarget::Closure(1.0), GripTarget::Force(0.0), GripTarget::Force(3.5)]

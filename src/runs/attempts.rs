@@ -10,10 +10,7 @@ use std::{
     sync::Mutex,
 };
 
-use super::{
-    record_line::LineError,
-    run_folder::{ATTEMPTS, RunFolderError, of_folder},
-};
+use super::run_folder::{ATTEMPTS, RunFolderError, of_folder};
 use softvt_common::{
     episode_id::EpisodeIndex,
     files,
@@ -35,9 +32,6 @@ struct BegunAttempts {
 
 impl Attempts {
     /// The attempts of earlier sessions in the folder of a run.
-    ///
-    /// # Errors
-    /// Their file cannot be read.
     pub fn open(dir: &Path) -> Result<Self, RunFolderError> {
         let (path, mut begun) = (dir.join(ATTEMPTS), BegunAttempts::default());
         if path.is_file() {
@@ -45,10 +39,8 @@ impl Attempts {
             file.keep_whole_lines(&bytes)?;
             begun.file = Some(file);
             for (number, line) in whole_lines(&bytes) {
-                let index = serde_json::from_slice(line).map_err(|error| RunFolderError::BadLine {
-                    path: path.display().to_string(),
-                    line: number,
-                    source: LineError::Attempt(error),
+                let index = serde_json::from_slice(line).map_err(|error| {
+                    RunFolderError::in_line(&path, number, format_args!("not an attempt: {error}"))
                 })?;
                 *begun.counts.entry(index).or_insert(0) += 1;
             }
@@ -57,9 +49,6 @@ impl Attempts {
     }
 
     /// Writes that an attempt at an episode has begun.
-    ///
-    /// # Errors
-    /// The file cannot be written.
     pub fn begin(&self, index: EpisodeIndex) -> Result<(), RunFolderError> {
         let mut begun = lock(&self.begun);
         *begun.counts.entry(index).or_insert(0) += 1;
@@ -85,9 +74,6 @@ impl Attempts {
     }
 
     /// Removes the file of a complete run, whose records have the numbers.
-    ///
-    /// # Errors
-    /// It cannot be removed.
     pub fn remove(&self) -> Result<(), RunFolderError> {
         lock(&self.begun).file = None;
         Ok(files::remove_if_present(&self.path)?)

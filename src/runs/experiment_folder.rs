@@ -11,7 +11,6 @@ use serde_json::{Map, Value};
 
 use super::{
     manifest::ExperimentManifest,
-    record_line::LineError,
     run_folder::{RUN, RunFolder, RunFolderError, of_folder},
 };
 use softvt_common::{
@@ -33,18 +32,14 @@ pub const RESERVED: [&str; 4] = [RUN, POINTS, ROWS, TABLE];
 /// A row of results, with sorted keys; or the fields of a point that are data.
 pub type ExperimentRow = Map<String, Value>;
 
-/// A finished point.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct FinishedPoint {
-    /// Its number.
     pub point: usize,
     /// Its fields that are data.
     pub parameters: ExperimentRow,
-    /// Its rows.
     pub rows: Vec<ExperimentRow>,
 }
 
-/// The folder of an experiment in progress.
 pub struct ExperimentFolder {
     dir: PathBuf,
     points: Journal,
@@ -74,8 +69,7 @@ impl ExperimentFolder {
         manifest.write_or_compare(dir)?;
         let finished = whole_lines(&bytes).map(|(line, text)| {
             let point: FinishedPoint = serde_json::from_slice(text).map_err(|error| {
-                let (path, source) = (path.display().to_string(), LineError::Point(error));
-                RunFolderError::BadLine { path, line, source }
+                RunFolderError::in_line(&path, line, format_args!("not a point: {error}"))
             })?;
             Ok((point.point, point))
         });
@@ -84,18 +78,11 @@ impl ExperimentFolder {
         Ok((Self { dir: dir.into(), points }, finished))
     }
 
-    /// Adds a finished point.
-    ///
-    /// # Errors
-    /// The file cannot be written.
     pub fn add(&mut self, point: &FinishedPoint) -> Result<(), RunFolderError> {
         Ok(self.points.append(&json_lines(&self.dir.join(POINTS), [point])?)?)
     }
 
     /// Removes the files of an experiment without a finished point, and the folder if it is empty then.
-    ///
-    /// # Errors
-    /// A file cannot be removed.
     pub fn discard(self) -> Result<(), RunFolderError> {
         for name in [RUN, POINTS] {
             files::remove_if_present(&self.dir.join(name))?;
@@ -105,9 +92,6 @@ impl ExperimentFolder {
     }
 
     /// Writes the rows of all points, in their order.
-    ///
-    /// # Errors
-    /// A file cannot be written.
     pub fn write_rows(&mut self, points: &[FinishedPoint], columns: &[String]) -> Result<(), RunFolderError> {
         self.points.replace(&json_lines(&self.dir.join(POINTS), points)?)?;
         let rows = points.iter().flat_map(|point| &point.rows);

@@ -28,10 +28,8 @@ use softvt_policy::profile::{GripCode, Profile};
 /// The version of softvt that writes run folders.
 pub const VERSION: &str = env!("CARGO_PKG_VERSION");
 
-/// Content of `run.json`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct RunManifest {
-    /// Version of softvt.
     pub softvt: String,
     /// The script, relative to `folder`.
     pub script: String,
@@ -49,13 +47,12 @@ pub struct RunManifest {
     /// File of `--vary`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub vary: Option<String>,
-    /// What a safe grip needs, if the suite states it.
+    /// Knowledge that a safe grip needs, if the suite states it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub needs: Option<NeededKnowledge>,
     /// The suite whose rigid twin this one is.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub twin_of: Option<String>,
-    /// Name of the policy.
     pub policy: String,
     /// Profile of a policy server, or of the clients of `softvt serve`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -69,7 +66,6 @@ pub struct RunManifest {
     /// File of a policy in Lua. Its SHA-256 is among the sources.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub policy_file: Option<String>,
-    /// The run whose actions were repeated.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub replayed: Option<ReplaySource>,
     /// Files of the demonstrations that were re-executed.
@@ -88,11 +84,8 @@ pub struct RunManifest {
     /// Hash of the secret of a judged run.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub seed_hash: Option<String>,
-    /// Split of the episodes.
     pub split: EpisodeSplit,
-    /// Indices of the tasks.
     pub tasks: Vec<usize>,
-    /// Episodes per task.
     pub episodes: u32,
     /// The episodes of each task, if only some are run.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
@@ -100,7 +93,6 @@ pub struct RunManifest {
     /// The part of the run.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub shard: Option<Shard>,
-    /// Shifts by name and value.
     pub shifts: Vec<ShiftValue>,
     /// Values of all options of the script.
     pub options: BTreeMap<String, String>,
@@ -112,7 +104,7 @@ pub struct RunManifest {
     pub settings: Settings,
     /// SHA-256 of files by name.
     pub sources: BTreeMap<String, String>,
-    /// Those of them that are not as in the library of the binary, by their path there.
+    /// Files that are not as in the library of the binary, by their path there.
     #[serde(default, skip_serializing_if = "BTreeSet::is_empty")]
     pub modified: BTreeSet<String>,
     /// Definition of D and of its limits.
@@ -126,12 +118,10 @@ pub struct RunManifest {
     pub folder: Option<String>,
 }
 
-/// The run whose actions are repeated.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ReplaySource {
     /// The folder, as it was typed.
     pub run: String,
-    /// Name of the recorded policy.
     pub policy: String,
     /// True if the recorded policy had access to ground-truth state.
     pub privileged: bool,
@@ -141,16 +131,12 @@ pub struct ReplaySource {
     pub sha256: String,
 }
 
-/// A file of imported demonstrations.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ImportedFile {
-    /// File name without folders.
     pub file: String,
-    /// SHA-256, hexadecimal.
     pub sha256: String,
     /// Name of its format, such as SoftVTBench.
     pub format: String,
-    /// Demonstrations in it.
     pub demos: usize,
     /// Source of the executed commands.
     pub commands: String,
@@ -171,25 +157,33 @@ impl RunManifest {
     /// # Errors
     /// The text is of an experiment or of another version, or is not a manifest.
     pub fn parse(path: &Path, text: &str) -> Result<Self, RunFolderError> {
-        /// What tells the kind of a manifest.
+        /// The keys that distinguish kinds of manifests.
         #[derive(Deserialize)]
         struct Head {
             softvt: String,
             experiment: Option<String>,
         }
         let head: Option<Head> = serde_json::from_str(text).ok();
-        let dir = || path.parent().unwrap_or(path).display().to_string();
-        let path = path.display().to_string();
-        serde_json::from_str(text).map_err(|source| match head {
-            Some(Head { experiment: Some(_), .. }) => RunFolderError::Experiment { dir: dir() },
-            Some(Head { softvt: version, .. }) if version != VERSION => {
-                RunFolderError::OtherVersion { path, version }
+        serde_json::from_str(text).map_err(|error| match head {
+            Some(Head { experiment: Some(_), .. }) => {
+                let dir = path.parent().unwrap_or(path).display();
+                let what = "holds an experiment, not a run of a suite; its rows are in";
+                RunFolderError::new(format_args!("{dir} {what} {dir}/rows.jsonl"))
             }
-            _ => RunFolderError::Manifest { path, source },
+            Some(Head { softvt: version, .. }) if version != VERSION => Self::other_version(path, &version),
+            _ => not_a_manifest(path, &error),
         })
     }
 
-    /// What the run changes of its suite.
+    /// The error about a file of a run of another version of softvt.
+    pub(crate) fn other_version(path: &Path, version: &str) -> RunFolderError {
+        let path = path.display();
+        let what = format_args!(
+            "{path} was written by softvt {version} in another format: read it with that version"
+        );
+        RunFolderError::new(what)
+    }
+
     pub fn changes(&self) -> RunChanges {
         RunChanges {
             arguments: self.arguments.clone(),
@@ -244,9 +238,6 @@ impl RunManifest {
     }
 
     /// Writes the manifest into a run folder. One that is there must be of the same run.
-    ///
-    /// # Errors
-    /// The file cannot be written or read, or is of another run.
     pub(crate) fn write_or_compare(&self, dir: &Path) -> Result<(), RunFolderError> {
         match dir.join(RUN).exists() {
             true => check_same(dir, &Self::read(dir)?.identity(), &self.identity()),
@@ -303,15 +294,11 @@ pub fn in_project(path: &str) -> &str {
 /// Content of the `run.json` of an experiment.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ExperimentManifest {
-    /// Version of softvt.
     pub softvt: String,
     /// The script, relative to `folder`.
     pub script: String,
-    /// Name of the experiment.
     pub experiment: String,
-    /// Number of its points.
     pub points: usize,
-    /// Base seed.
     pub seed: u64,
     /// Values of all options of the script.
     pub options: BTreeMap<String, String>,
@@ -327,16 +314,13 @@ pub struct ExperimentManifest {
 
 impl ExperimentManifest {
     /// Writes the manifest into the folder of an experiment. One that is there must be of the same experiment.
-    ///
-    /// # Errors
-    /// The file cannot be written or read, or is of another experiment.
     pub(crate) fn write_or_compare(&self, dir: &Path) -> Result<(), RunFolderError> {
         let path = dir.join(RUN);
         if !path.exists() {
             return Ok(files::write_json(&path, self)?);
         }
-        let stored: Self = serde_json::from_str(&files::read_text(&path)?)
-            .map_err(|source| RunFolderError::Manifest { path: path.display().to_string(), source })?;
+        let stored: Self =
+            serde_json::from_str(&files::read_text(&path)?).map_err(|error| not_a_manifest(&path, &error))?;
         check_same(dir, &Self { folder: self.folder.clone(), ..stored }, self)
     }
 }
@@ -346,10 +330,18 @@ pub fn working_folder() -> String {
     std::env::current_dir().map(|dir| dir.display().to_string()).unwrap_or_default()
 }
 
+fn not_a_manifest(path: &Path, error: &serde_json::Error) -> RunFolderError {
+    RunFolderError::new(format_args!("{} is not a valid run file: {error}", path.display()))
+}
+
 /// Checks that the manifest in a folder is that of the run which is continued.
 fn check_same<M: Serialize>(dir: &Path, stored: &M, own: &M) -> Result<(), RunFolderError> {
-    let path = dir.join(RUN).display().to_string();
-    json_difference(stored, own).map_or(Ok(()), |what| Err(RunFolderError::OtherRun { path, what }))
+    json_difference(stored, own).map_or(Ok(()), |what| {
+        let path = dir.join(RUN);
+        let remedy = "resume it with its original arguments, or select another output folder";
+        let path = path.display();
+        Err(RunFolderError::new(format_args!("{path} belongs to another run: {what}; {remedy}")))
+    })
 }
 
 #[cfg(test)]

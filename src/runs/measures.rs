@@ -25,12 +25,11 @@ use softvt_evaluation::{
     statistics::{Distribution, Rate, stratified_bootstrap},
 };
 
-/// What a measure is about: measures of one group share a table.
+/// Subject of a measure: measures of one group share a table.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum MeasureGroup {
     /// Goal, drops and limits. Of all episodes together, these have intervals by the bootstrap within tasks.
     Success,
-    /// D of the targets.
     Deformation,
     /// Forces, contact and slip of the grip.
     Grip,
@@ -42,7 +41,6 @@ pub enum MeasureGroup {
     OtherRule,
 }
 
-/// A measure of episodes.
 #[derive(Debug)]
 pub struct Measure {
     /// Key in summaries; `None` if they do not have it.
@@ -51,21 +49,16 @@ pub struct Measure {
     pub within: Option<&'static str>,
     /// Key in comparisons; `None` if runs are not compared by it.
     pub paired: Option<&'static str>,
-    /// Its table.
     pub group: MeasureGroup,
-    /// Name in tables.
     pub heading: &'static str,
     /// Unit; empty for none.
     pub unit: &'static str,
-    /// Decimals in tables.
     pub digits: usize,
     /// True for a success that needs the limits of soft targets.
     pub needs_limit: bool,
-    /// Meaning.
     pub about: &'static str,
     /// Its value in a summary.
     pub score: fn(&GroupScores) -> Option<Score>,
-    /// Its value in a comparison.
     pub difference: fn(&PairedComparison) -> Option<PairedDifference>,
 }
 
@@ -76,20 +69,16 @@ impl Measure {
         format!("{}{comma}{}", self.heading, self.unit)
     }
 
-    /// The measures of a group.
     pub fn of(group: MeasureGroup) -> impl Iterator<Item = &'static Self> {
         MEASURES.iter().filter(move |measure| measure.group == group)
     }
 }
 
-/// A measure of several episodes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Score {
     /// Share of the episodes; not judged for what was judged in none.
     Rate(Rate),
-    /// Mean and percentiles.
     Distribution(Distribution),
-    /// Mean alone.
     Mean(Option<f64>),
 }
 
@@ -152,7 +141,6 @@ impl<'a> Episodes<'a> {
     }
 }
 
-/// The same episodes in two runs.
 struct Pairs<'a> {
     pairs: &'a [EpisodePair<'a>],
 }
@@ -363,13 +351,11 @@ macro_rules! measures {
             pub others_unknown: usize,
             /// Number of episodes without Goal Success by the stage at which they ended.
             pub failed_stages: BTreeMap<TaskStage, usize>,
-            /// Number of episodes by their category.
             pub categories: BTreeMap<EpisodeCategory, usize>,
             /// Number of episodes of the category "over the limit" in which the object was crushed.
             pub crushed_over_limit: usize,
             /// Smallest and largest τ that was applied to a target, %; null without any.
             pub tau_range: Option<TauRange>,
-            /// Deformation within the episodes.
             pub within_episodes: EpisodeDeformation,
             /// Metrics of the suite over the valid episodes that have them, by name.
             #[serde(skip_serializing_if = "BTreeMap::is_empty")]
@@ -425,7 +411,6 @@ macro_rules! measures {
         }
 
         impl PairedComparison {
-            /// Compares the two episodes of each pair.
             pub fn from_pairs(pairs: &[EpisodePair<'_>]) -> Self {
                 let pairs = Pairs { pairs };
                 Self {

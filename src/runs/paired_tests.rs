@@ -70,7 +70,7 @@ fn normal_tails(ranks: &[usize], smaller: usize) -> f64 {
     libm::erfc(z / std::f64::consts::SQRT_2)
 }
 
-/// What a number of episodes can separate of two policies that run the same ones, in percentage points of a rate.
+/// Differences of two policies that a number of common episodes can show, in percentage points of a rate.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DetectableDifference {
     /// Smallest difference that can be significant at 5 %: that of [`MIN_DISCORDANT`] episodes, which
@@ -87,12 +87,12 @@ pub const MIN_DISCORDANT: usize = 6;
 const QUANTILES: f64 = 1.959_964 + 0.841_621;
 
 impl DetectableDifference {
-    /// That of a run with `successes` of `episodes`; `None` if it cannot separate any policies.
+    /// The differences for a run with `successes` of `episodes`; `None` if it cannot separate any policies.
     pub fn new(successes: usize, episodes: usize) -> Option<Self> {
         if episodes < MIN_DISCORDANT {
             return None;
         }
-        // As Agresti and Coull: a run without a failure does not prove that there is none.
+        // As Agresti and Coull: a run without a failure does not prove a rate of zero.
         let rate = (successes as f64 + 2.0) / (episodes as f64 + 4.0);
         let smallest = 100.0 * MIN_DISCORDANT as f64 / episodes as f64;
         let found = 100.0 * QUANTILES * (2.0 * rate * (1.0 - rate) / episodes as f64).sqrt();

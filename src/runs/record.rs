@@ -8,8 +8,10 @@ use std::{collections::BTreeMap, fmt};
 use serde::{Deserialize, Serialize, Serializer, de::DeserializeOwned, ser::SerializeMap};
 use serde_json::json;
 
-use softvt_common::episode_id::{EpisodeId, EpisodeSplit};
-use softvt_common::text::decimal;
+use softvt_common::{
+    episode_id::{EpisodeId, EpisodeSplit},
+    text::decimal,
+};
 use softvt_evaluation::{
     category::{CRUSHED_PCT, EpisodeCategory},
     safety::{and_known, round_to_six_decimals},
@@ -35,17 +37,13 @@ pub const PRIVILEGED_POLICIES: [&str; 11] = [
 /// Id, task, target and policy of an episode: the first columns of its record.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 pub struct EpisodeHeader {
-    /// Id of the episode.
     #[serde(flatten)]
     pub id: EpisodeId,
-    /// Instruction given to the policy.
     pub prompt: String,
     /// Prompt of the task, where each episode has a prompt of its own.
     #[serde(default)]
     pub task_prompt: Option<String>,
-    /// Name of the layout.
     pub layout: String,
-    /// Name of the policy.
     pub policy: String,
     /// True if the policy sees the true state, as experts do.
     #[serde(default)]
@@ -53,7 +51,6 @@ pub struct EpisodeHeader {
     /// True if the actions are those of a recorded run.
     #[serde(default)]
     pub replayed: bool,
-    /// Asset of the target.
     pub asset: String,
     /// True if the target is a soft body.
     pub soft: bool,
@@ -112,13 +109,9 @@ impl Serialize for EpisodeHeader {
 /// Demonstration of another simulator or robot, of which an episode takes the initial state and the actions.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct DemonstrationOrigin {
-    /// Name of its file, without folders.
     pub file: String,
-    /// SHA-256 of the file, hexadecimal.
     pub sha256: String,
-    /// Name of the demonstration in the file.
     pub demo: String,
-    /// Format of the file.
     pub format: String,
     /// Initial state that replaces the one of the layout.
     pub start: InitialStateOverride,
@@ -143,11 +136,8 @@ pub struct UnreachableCommand {
 pub struct JointOutsideLimits {
     /// Number of the joint, from 1 at the base.
     pub number: u8,
-    /// Commanded position, rad.
     pub position_rad: f64,
-    /// Lower limit, rad.
     pub lower_rad: f64,
-    /// Upper limit, rad.
     pub upper_rad: f64,
 }
 
@@ -164,10 +154,8 @@ impl fmt::Display for UnreachableCommand {
     }
 }
 
-/// Counters of the rollout.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct RolloutStats {
-    /// Number of control steps.
     pub steps: u32,
     /// Simulated time since the policy took over, s.
     pub time_s: f64,
@@ -185,7 +173,6 @@ pub struct RolloutStats {
     /// Number of control steps whose command was farther from the tool than one step of the inverse kinematics reaches
     /// (0.2 m, 0.6 rad), or had a joint position outside of its limits: out of reach, or in the wrong frame or unit.
     pub far_commands: u32,
-    /// The first of them.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub first_far_command: Option<UnreachableCommand>,
     /// Number of control steps whose grip value was outside of its range, and was clamped: for decoded answers of
@@ -210,7 +197,6 @@ pub struct RolloutStats {
     pub metrics: BTreeMap<String, Option<f64>>,
     /// SHA-256 of the actions, as the float64 numbers of their file (little-endian), hexadecimal.
     pub actions_sha256: String,
-    /// Hash of the final state, hexadecimal.
     pub state_hash: String,
 }
 
@@ -221,7 +207,7 @@ fn is_zero(count: &u32) -> bool {
 }
 
 impl RolloutStats {
-    /// What of the commands was not executed as given, one phrase each.
+    /// Commands that were not executed as given, one phrase per reason.
     pub fn command_notes(&self) -> Vec<String> {
         let first = self.first_far_command.map_or(String::new(), |first| format!(", first: {first}"));
         let far = (self.far_commands > 0)
@@ -237,15 +223,11 @@ impl RolloutStats {
 /// One episode. Fields keep their order, and numbers every bit, through JSON.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct EpisodeRecord {
-    /// Id, task, target and policy.
     #[serde(flatten)]
     pub header: EpisodeHeader,
-    /// End of the rollout.
     pub outcome: Outcome,
-    /// Judgement of the episode.
     #[serde(flatten)]
     pub verdict: Verdict,
-    /// Counters of the rollout.
     #[serde(flatten)]
     pub stats: RolloutStats,
 }
@@ -463,21 +445,6 @@ pub(crate) mod tests {
         assert!(!record.has_soft_target());
         record.verdict.targets[1].soft = true;
         assert!(record.has_soft_target());
-    }
-
-    #[test]
-    fn commands_that_were_not_executed_as_given_are_told() {
-        let mut stats = sample().stats;
-        assert!(stats.command_notes().is_empty());
-        (stats.far_commands, stats.clamped_grips) = (168, 3);
-        stats.first_far_command = Some(UnreachableCommand {
-            position_m: [467.0, 4.25, -260.0],
-            distance_m: 534.5104,
-            angle_rad: 0.0,
-            joint: None,
-        });
-        let far = "168 of 168 commands were out of reach, first: (467, 4.25, -260) m, 534.51 m and 0 rad from the tool";
-        assert_eq!(stats.command_notes(), [far, "3 of 168 grip values were out of range"]);
     }
 
     #[test]

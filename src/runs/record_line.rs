@@ -1,8 +1,7 @@
 //! A line of `episodes.jsonl`: the record of an episode, and its SHA-256 as the last key.
 //!
-//! The digest is of the bytes before the comma in front of its key. It finds a line that was changed or damaged. It
-//! does not prove that the simulation gave the record: whoever changes a line can compute a new digest. A replay proves
-//! that.
+//! The digest is of the bytes before the comma in front of its key. It finds a line that was changed or damaged. It is
+//! no proof that the simulation gave the record, since a new digest can be computed with a changed line. A replay is.
 
 use std::path::Path;
 
@@ -14,7 +13,6 @@ use softvt_common::{
 
 /// A line is not the record of an episode as it was written.
 #[derive(Debug, thiserror::Error)]
-#[allow(missing_docs, reason = "the messages describe the variants")]
 pub enum LineError {
     #[error("not an episode record: {0}")]
     Record(#[from] serde_json::Error),
@@ -24,16 +22,12 @@ pub enum LineError {
         "its SHA-256 is not the record_sha256 at its end: the line was changed after the episode, or damaged"
     )]
     OtherDigest,
-    #[error("not an attempt: {0}")]
-    Attempt(serde_json::Error),
-    #[error("not a point: {0}")]
-    Point(serde_json::Error),
 }
 
-/// What is before the digest in a line.
+/// Text before the digest in a line.
 const KEY: &str = ",\"record_sha256\":\"";
 
-/// What follows a record in its line.
+/// Text after a record in its line.
 fn ending(record: &[u8]) -> String {
     format!("{KEY}{}\"}}", sha256_hex(record))
 }

@@ -19,7 +19,6 @@ pub struct Requirement {
     bound: f64,
 }
 
-/// A result that a requirement can name.
 #[derive(Debug)]
 struct Metric {
     name: &'static str,
@@ -30,11 +29,9 @@ struct Metric {
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Unit {
-    /// A share of 1.
     Share,
     /// Percent of a length.
     Percent,
-    /// A number of episodes.
     Episodes,
 }
 

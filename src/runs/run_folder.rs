@@ -6,6 +6,7 @@
 
 use std::{
     collections::BTreeMap,
+    fmt::Display,
     fs, io,
     path::{Path, PathBuf},
 };
@@ -37,39 +38,31 @@ pub const SUMMARY: &str = "summary.json";
 pub(super) const EPISODE_FOLDERS: [&str; 5] =
     ["actions", "trace", "video", "mcap", softvtbench_files::FOLDER];
 
-/// Error of using a run folder.
-#[allow(missing_docs, reason = "the messages describe the variants")]
+/// A file of a run is not valid, not of that run, or cannot be read or written. The text names the file and the remedy.
 #[derive(Debug, thiserror::Error)]
-pub enum RunFolderError {
-    /// `found` is a file of that run.
-    #[error("{dir} already holds a run ({found}): resume it, or give another output folder")]
-    Occupied { dir: String, found: &'static str },
-    /// `found` is a file that no run has written.
-    #[error("{dir} is not empty and holds no run (it contains {found}); give a new output folder")]
-    Foreign { dir: String, found: String },
-    #[error("another softvt process is using {dir}; wait for it to finish, or stop it")]
-    Busy { dir: String },
-    #[error(transparent)]
-    File(#[from] FileError),
-    #[error("{path} is not a valid run file: {source}")]
-    Manifest { path: String, source: serde_json::Error },
-    #[error("{dir} holds an experiment, not a run of a suite; its rows are in {dir}/rows.jsonl")]
-    Experiment { dir: String },
-    #[error("{path} was written by softvt {version} in another format: read it with that version")]
-    OtherVersion { path: String, version: String },
-    #[error(
-        "{path} belongs to another run: {what}; resume it with its original arguments, or select another output folder"
-    )]
-    OtherRun { path: String, what: String },
+#[error("{0}")]
+pub struct RunFolderError(String);
+
+impl RunFolderError {
+    pub(crate) fn new(message: impl ToString) -> Self {
+        Self(message.to_string())
+    }
+
     /// `line` counts from 1.
-    #[error("{path}:{line}: {source}")]
-    BadLine { path: String, line: usize, source: LineError },
-    #[error("{path}:{line}: {episode} occurs twice (first in line {first}): remove one of the lines")]
-    DuplicateEpisode { path: String, line: usize, first: usize, episode: EpisodeIndex },
-    #[error(
-        "{path}:{line}: {episode} is not of the run that {RUN} describes; one of the two files was changed, or is of another run"
-    )]
-    ForeignEpisode { path: String, line: usize, episode: EpisodeIndex },
+    pub(crate) fn in_line(path: &Path, line: usize, what: impl Display) -> Self {
+        Self(format!("{}:{line}: {what}", path.display()))
+    }
+
+    fn occupied(dir: &Path, found: &str) -> Self {
+        let dir = dir.display();
+        Self(format!("{dir} already holds a run ({found}): resume it, or give another output folder"))
+    }
+}
+
+impl From<FileError> for RunFolderError {
+    fn from(error: FileError) -> Self {
+        Self::new(error)
+    }
 }
 
 /// The folder of a run in progress, locked against other processes.
@@ -81,34 +74,37 @@ pub struct RunFolder {
 
 impl RunFolder {
     /// Checks that `dir` holds no run.
-    ///
-    /// # Errors
-    /// The folder holds a run.
     pub fn check_vacant(dir: &Path) -> Result<(), RunFolderError> {
         match [RUN, EPISODES, SUMMARY].into_iter().find(|name| dir.join(name).exists()) {
-            Some(found) => Err(RunFolderError::Occupied { dir: dir.display().to_string(), found }),
+            Some(found) => Err(RunFolderError::occupied(dir, found)),
             None => Ok(()),
         }
     }
 
-    /// Checks that `dir` is new or empty.
+    /// Checks that `dir` is new or empty, so that a run never mixes its files with others. Hidden files do not count:
+    /// systems and editors leave them anywhere.
     ///
     /// # Errors
     /// The folder holds a run or anything else.
     pub fn check_new(dir: &Path) -> Result<(), RunFolderError> {
         Self::check_vacant(dir)?;
-        check_own(dir)
+        let Ok(entries) = fs::read_dir(dir) else { return Ok(()) };
+        let names = entries.flatten().map(|entry| entry.file_name().to_string_lossy().into_owned());
+        match names.filter(|name| !name.starts_with('.')).min() {
+            None => Ok(()),
+            Some(found) => Err(RunFolderError(format!(
+                "{} is not empty and holds no run (it contains {found}); give a new output folder",
+                dir.display()
+            ))),
+        }
     }
 
     /// Checks that `dir`, which shall hold the folders of several runs, is new or empty, or holds such folders already.
-    ///
-    /// # Errors
-    /// The folder holds something else.
     pub fn check_parent(dir: &Path) -> Result<(), RunFolderError> {
         let holds_runs = |dir: &Path| subfolders(dir).iter().any(|inner| Self::check_vacant(inner).is_err());
         match holds_runs(dir) || subfolders(dir).iter().any(|inner| holds_runs(inner)) {
             true => Ok(()),
-            false => check_own(dir),
+            false => Self::check_new(dir),
         }
     }
 
@@ -135,7 +131,7 @@ impl RunFolder {
         files::create_folder(dir)?;
         let path = dir.join(EPISODES);
         if !path.exists() {
-            check_own(dir)?;
+            Self::check_new(dir)?;
         }
         let (mut episodes, bytes) = Journal::resume(&path).map_err(of_folder(dir, EPISODES))?;
         // Without a manifest, the run of the episodes is not known.
@@ -148,47 +144,40 @@ impl RunFolder {
         Ok((Self { dir: dir.into(), episodes }, records))
     }
 
-    /// The folder.
     pub fn path(&self) -> &Path {
         &self.dir
     }
 
     /// Appends and syncs the record of an episode whose other files are written. A crash leaves at
     /// most one truncated line.
-    ///
-    /// # Errors
-    /// The line cannot be written.
     pub fn append(&mut self, record: &EpisodeRecord) -> Result<(), RunFolderError> {
         Ok(self.episodes.append(&write_line(&self.dir.join(EPISODES), record)?)?)
     }
 
     /// Rewrites the lines in the order of `records`, which must be all of them.
-    ///
-    /// # Errors
-    /// The file cannot be written.
     pub fn write_in_order(&mut self, records: &[EpisodeRecord]) -> Result<(), RunFolderError> {
         Ok(self.episodes.replace(&episode_lines(&self.dir.join(EPISODES), records)?)?)
     }
 
     /// Removes the files of a run without episodes, and the folder if it is empty then.
-    ///
-    /// # Errors
-    /// A file cannot be removed.
     pub fn discard(self) -> Result<(), RunFolderError> {
         for name in [RUN, SCRIPTS, EPISODES] {
             files::remove_if_present(&self.dir.join(name))?;
         }
         for name in EPISODE_FOLDERS {
-            match fs::remove_dir_all(self.dir.join(name)) {
-                Err(error) if error.kind() != io::ErrorKind::NotFound => {
-                    return Err(FileError::io("remove", &self.dir.join(name))(error).into());
-                }
-                _ => {}
-            }
+            remove_folder_if_present(&self.dir.join(name))?;
         }
         // Fails if the folder holds other files, which must stay.
         let _ = fs::remove_dir(&self.dir);
         Ok(())
+    }
+}
+
+/// Removes a folder with all that it contains.
+pub fn remove_folder_if_present(dir: &Path) -> Result<(), FileError> {
+    match fs::remove_dir_all(dir) {
+        Err(error) if error.kind() != io::ErrorKind::NotFound => Err(FileError::io("remove", dir)(error)),
+        _ => Ok(()),
     }
 }
 
@@ -197,23 +186,15 @@ fn subfolders(dir: &Path) -> Vec<PathBuf> {
     entries.map(|entry| entry.path()).filter(|path| path.is_dir()).collect()
 }
 
-/// Checks that a folder without a run is new or empty, so that a run never mixes its files with others. Hidden files
-/// do not count: systems and editors leave them anywhere.
-fn check_own(dir: &Path) -> Result<(), RunFolderError> {
-    let Ok(entries) = fs::read_dir(dir) else { return Ok(()) };
-    let names = entries.filter_map(Result::ok).map(|entry| entry.file_name().to_string_lossy().into_owned());
-    match names.filter(|name| !name.starts_with('.')).min() {
-        None => Ok(()),
-        Some(found) => Err(RunFolderError::Foreign { dir: dir.display().to_string(), found }),
-    }
-}
-
 /// Names the folder in errors of its journal `found`, for `map_err`.
 pub fn of_folder(dir: &Path, found: &'static str) -> impl FnOnce(JournalError) -> RunFolderError + use<> {
-    let dir = dir.display().to_string();
+    let dir = dir.to_owned();
     move |error| match error {
-        JournalError::Exists => RunFolderError::Occupied { dir, found },
-        JournalError::Busy => RunFolderError::Busy { dir },
+        JournalError::Exists => RunFolderError::occupied(&dir, found),
+        JournalError::Busy => RunFolderError(format!(
+            "another softvt process is using {}; wait for it to finish, or stop it",
+            dir.display()
+        )),
         JournalError::File(error) => error.into(),
     }
 }
@@ -241,20 +222,22 @@ pub(super) fn is_truncated(dir: &Path) -> bool {
 fn parse(bytes: &[u8], path: &Path, manifest: &RunManifest) -> Result<Vec<EpisodeRecord>, RunFolderError> {
     let mut lines: BTreeMap<EpisodeIndex, usize> = BTreeMap::new();
     let record = |(line, text): (usize, &[u8])| {
-        let path = path.display().to_string();
+        let bad = |what: &dyn Display| Err(RunFolderError::in_line(path, line, what));
         let record = match read_line(text) {
             Ok(record) => record,
-            Err(LineError::NoDigest) => {
-                return Err(RunFolderError::OtherVersion { path, version: manifest.softvt.clone() });
-            }
-            Err(source) => return Err(RunFolderError::BadLine { path, line, source }),
+            Err(LineError::NoDigest) => return Err(RunManifest::other_version(path, &manifest.softvt)),
+            Err(error) => return bad(&error),
         };
         let episode = record.header.id.index();
         if !manifest.has_record(&record) {
-            return Err(RunFolderError::ForeignEpisode { path, line, episode });
+            return bad(&format_args!(
+                "{episode} is not of the run that {RUN} describes; one of the two files was changed, or is of another run"
+            ));
         }
         match lines.insert(episode, line) {
-            Some(first) => Err(RunFolderError::DuplicateEpisode { path, line, first, episode }),
+            Some(first) => {
+                bad(&format_args!("{episode} occurs twice (first in line {first}): remove one of the lines"))
+            }
             None => Ok(record),
         }
     };
@@ -266,7 +249,7 @@ mod tests {
     use super::*;
     use crate::{sample_manifest, sample_record};
 
-    /// A run of four episodes of a task.
+    /// A run of a task with four episodes.
     fn manifest() -> RunManifest {
         RunManifest { episodes: 4, ..sample_manifest() }
     }
@@ -315,28 +298,6 @@ mod tests {
         assert_eq!(indices(root.path()), [0, 1, 2]);
         let (_, none) = RunFolder::resume(&root.path().join("new"), &manifest()).unwrap();
         assert!(none.is_empty());
-    }
-
-    #[test]
-    fn a_folder_with_a_run_is_refused_and_not_modified() {
-        let root = tempfile::tempdir().unwrap();
-        let mut folder = RunFolder::create(root.path(), &manifest()).unwrap();
-        folder.append(&episode(0)).unwrap();
-        let error = RunFolder::create(root.path(), &manifest()).unwrap_err().to_string();
-        assert!(
-            error.contains("already holds a run (run.json)") && error.contains("another output folder"),
-            "{error}"
-        );
-        assert_eq!(indices(root.path()), [0]);
-    }
-
-    #[test]
-    fn the_error_names_a_folder_that_cannot_be_created() {
-        let root = tempfile::tempdir().unwrap();
-        let file = root.path().join("file");
-        fs::write(&file, "x").unwrap();
-        let error = RunFolder::create(&file.join("run"), &manifest()).unwrap_err().to_string();
-        assert!(error.starts_with("cannot create the folder") && error.contains("file/run"), "{error}");
     }
 
     #[test]

@@ -2,58 +2,36 @@
 
 use std::{
     collections::BTreeMap,
-    fs, io,
+    fs,
     path::{Path, PathBuf},
 };
 
 use super::{
-    actions::{self, ActionsError},
+    actions,
     manifest::RunManifest,
     record::EpisodeRecord,
-    run_folder::{EPISODE_FOLDERS, EPISODES, RUN, SCRIPTS, SUMMARY, episode_lines},
+    run_folder::{
+        EPISODE_FOLDERS, EPISODES, RUN, RunFolderError, SCRIPTS, SUMMARY, episode_lines,
+        remove_folder_if_present,
+    },
     softvtbench_files,
-    stored_run::{StoredRun, StoredRunError, load},
+    stored_run::{StoredRun, load},
     summary::SuiteSummary,
 };
-use softvt_common::episode_id::EpisodeIndex;
-use softvt_common::files::{self, FileError};
-use softvt_evaluation::thresholds::{ThresholdError, ThresholdFile};
-
-/// Error of merging shards.
-#[allow(missing_docs, reason = "the messages describe the variants")]
-#[derive(Debug, thiserror::Error)]
-pub enum MergeError {
-    #[error(transparent)]
-    Runs(#[from] StoredRunError),
-    #[error(transparent)]
-    File(#[from] FileError),
-    #[error(transparent)]
-    Thresholds(#[from] ThresholdError),
-    #[error("{0}; resume that shard to restore it")]
-    Actions(#[from] ActionsError),
-    #[error("{out} already exists; give a new folder")]
-    OutputExists { out: String },
-    #[error("these are shards of several suites ({suites}): merge each suite separately")]
-    SeveralSuites { suites: String },
-    #[error("{dir}: it is the run of a whole suite, not a shard")]
-    NotShard { dir: String },
-    #[error("{dir}: it is a shard of another run than {first}")]
-    OtherRun { dir: String, first: String },
-    #[error("{dir}: {episode} is also in {other}")]
-    DuplicateEpisode { dir: String, episode: EpisodeIndex, other: String },
-    #[error(
-        "suite {suite}: {missing} of {expected} episodes are missing, the first of which is {first}: a shard is not given, or not finished and can be resumed"
-    )]
-    Missing { suite: String, missing: usize, expected: usize, first: EpisodeIndex },
-}
+use softvt_common::{
+    episode_id::EpisodeIndex,
+    files::{self, FileError},
+};
+use softvt_evaluation::thresholds::ThresholdFile;
 
 /// Merges the shards in `dirs` into the new folder `out`, and returns the summary of each merged run, sorted by suite.
 ///
 /// # Errors
 /// A shard is missing, unfinished, given twice or of another run; `out` exists; a file cannot be read or written.
-pub fn merge(out: &Path, dirs: &[PathBuf]) -> Result<Vec<SuiteSummary>, MergeError> {
+pub fn merge(out: &Path, dirs: &[PathBuf]) -> Result<Vec<SuiteSummary>, RunFolderError> {
     if out.exists() {
-        return Err(MergeError::OutputExists { out: out.display().to_string() });
+        let out = out.display();
+        return Err(RunFolderError::new(format_args!("{out} already exists; give a new folder")));
     }
     let mut suites: BTreeMap<String, Vec<StoredRun>> = BTreeMap::new();
     let mut in_subfolders = false;
@@ -65,12 +43,16 @@ pub fn merge(out: &Path, dirs: &[PathBuf]) -> Result<Vec<SuiteSummary>, MergeErr
     }
     if suites.len() > 1 && !in_subfolders {
         let names: Vec<&str> = suites.keys().map(String::as_str).collect();
-        return Err(MergeError::SeveralSuites { suites: names.join(", ") });
+        return Err(RunFolderError::new(format_args!(
+            "these are shards of several suites ({}): merge each suite separately",
+            names.join(", ")
+        )));
     }
     // Everything is checked before anything is written.
     let merged: Vec<MergedRun> =
         suites.values().map(|shards| MergedRun::new(shards)).collect::<Result<_, _>>()?;
     let temp = files::temp_path(out);
+    // An earlier merge that was killed may have left it.
     remove_folder_if_present(&temp)?;
     let write = || {
         let mut summaries = Vec::new();
@@ -85,15 +67,7 @@ pub fn merge(out: &Path, dirs: &[PathBuf]) -> Result<Vec<SuiteSummary>, MergeErr
         Ok(summaries)
     };
     // The disk may be full: the space is freed.
-    write().inspect_err(|_: &MergeError| drop(remove_folder_if_present(&temp)))
-}
-
-/// Removes the folder that an earlier merge left when it was killed.
-fn remove_folder_if_present(dir: &Path) -> Result<(), FileError> {
-    match fs::remove_dir_all(dir) {
-        Err(error) if error.kind() != io::ErrorKind::NotFound => Err(FileError::io("remove", dir)(error)),
-        _ => Ok(()),
-    }
+    write().inspect_err(|_: &RunFolderError| drop(remove_folder_if_present(&temp)))
 }
 
 /// A run composed of shards.
@@ -106,33 +80,38 @@ struct MergedRun<'a> {
 
 impl<'a> MergedRun<'a> {
     /// Checks that the shards are complete and belong together.
-    fn new(shards: &'a [StoredRun]) -> Result<Self, MergeError> {
+    fn new(shards: &'a [StoredRun]) -> Result<Self, RunFolderError> {
         let of_run = &shards[0].manifest;
         let whole = |run: &StoredRun| RunManifest { shard: None, ..run.manifest.identity() };
         let mut seen: BTreeMap<EpisodeIndex, &StoredRun> = BTreeMap::new();
         for run in shards {
-            let dir = || run.dir.display().to_string();
+            let refuse =
+                |what: String| Err(RunFolderError::new(format_args!("{}: {what}", run.dir.display())));
             if run.manifest.shard.is_none() {
-                return Err(MergeError::NotShard { dir: dir() });
+                return refuse("it is the run of a whole suite, not a shard".to_owned());
             }
             if whole(run) != whole(&shards[0]) {
-                return Err(MergeError::OtherRun { dir: dir(), first: shards[0].dir.display().to_string() });
+                return refuse(format!("it is a shard of another run than {}", shards[0].dir.display()));
             }
             for record in &run.records {
                 let episode = record.header.id.index();
                 if let Some(other) = seen.insert(episode, run) {
-                    let other = other.dir.display().to_string();
-                    return Err(MergeError::DuplicateEpisode { dir: dir(), episode, other });
+                    return refuse(format!("{episode} is also in {}", other.dir.display()));
                 }
-                actions::read_checked(&run.dir, record)?;
+                actions::read_checked(&run.dir, record).map_err(|error| {
+                    RunFolderError::new(format_args!("{error}; resume that shard to restore it"))
+                })?;
             }
         }
         let RunManifest { tasks, episodes, suite, .. } = of_run;
         let of_task = |task: usize| (0..*episodes).map(move |episode| EpisodeIndex { task, episode });
         let mut all = tasks.iter().flat_map(|task| of_task(*task));
         if let Some(first) = all.find(|index| !seen.contains_key(index)) {
-            let (suite, expected) = (suite.clone(), tasks.len() * *episodes as usize);
-            return Err(MergeError::Missing { suite, missing: expected - seen.len(), expected, first });
+            let expected = tasks.len() * *episodes as usize;
+            return Err(RunFolderError::new(format_args!(
+                "suite {suite}: {} of {expected} episodes are missing, the first of which is {first}: a shard is not given, or not finished and can be resumed",
+                expected - seen.len()
+            )));
         }
         let mut records: Vec<EpisodeRecord> = shards.iter().flat_map(|run| run.records.clone()).collect();
         records.sort_by_key(|r| r.header.id.index());
@@ -142,7 +121,7 @@ impl<'a> MergedRun<'a> {
     }
 
     /// Writes the files of the run and returns its summary.
-    fn write(&self, folder: &Path) -> Result<SuiteSummary, MergeError> {
+    fn write(&self, folder: &Path) -> Result<SuiteSummary, RunFolderError> {
         let Self { shards, manifest, records } = self;
         files::create_folder(folder)?;
         for run in *shards {
@@ -159,7 +138,8 @@ impl<'a> MergedRun<'a> {
             fs::copy(&scripts, &target).map_err(FileError::io("copy to", &target))?;
         }
         let path = shards[0].dir.join(softvtbench_files::FOLDER).join(softvtbench_files::THRESHOLDS_JSON);
-        softvtbench_files::write_scores(folder, records, &ThresholdFile::read_released(&path)?)?;
+        let thresholds = ThresholdFile::read_released(&path).map_err(RunFolderError::new)?;
+        softvtbench_files::write_scores(folder, records, &thresholds)?;
         let suite = manifest.changes().suite_name(&manifest.suite);
         let summary = SuiteSummary::from_records(&suite, &manifest.policy, records);
         files::write_json(&folder.join(SUMMARY), &summary)?;

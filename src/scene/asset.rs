@@ -70,7 +70,7 @@ pub struct SoftMaterial {
 }
 
 impl SoftMaterial {
-    /// Largest allowed resolution.
+    /// Largest allowed number of voxels along an edge.
     pub const MAX_RESOLUTION: usize = 64;
     /// Range of the resolution.
     pub const RESOLUTION: Range = Range::closed(1.0, Self::MAX_RESOLUTION as f64);
@@ -144,8 +144,11 @@ impl Asset {
     /// Width between two fingers that grasp from above, m: the hint of the asset, or the narrower horizontal side. Not
     /// that of an articulated object, which is grasped by its parts.
     pub fn grasp_width(&self) -> f64 {
-        let size = self.shape.bounds().size();
-        self.hints.get(GRASP_WIDTH_HINT).copied().unwrap_or_else(|| size.x.min(size.y))
+        let narrow_side = || {
+            let size = self.shape.bounds().size();
+            size.x.min(size.y)
+        };
+        self.hints.get(GRASP_WIDTH_HINT).copied().unwrap_or_else(narrow_side)
     }
 
     /// Multiplies the density of everything that moves by `factor`.
@@ -179,7 +182,7 @@ pub enum JointMotion {
 /// Its serialised names are part of fingerprints of assets.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Joint {
-    /// Translation or rotation.
+    /// Translation along the axis or rotation about it.
     pub motion: JointMotion,
     /// Unit vector of the axis, object frame with all joints at 0.
     pub axis_o: Vec3,

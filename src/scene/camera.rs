@@ -12,7 +12,7 @@ use softvt_geometry::{Pose, Quat, Vec3};
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum CameraMount {
-    /// World frame.
+    /// Fixed to the world frame.
     World,
     /// Hand frame of the robot (`panda_hand`).
     Hand,

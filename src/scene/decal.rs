@@ -21,7 +21,7 @@ pub enum Typeface {
 pub struct LabelLine {
     /// Text, at most [`MAX_LETTERS`] characters.
     pub text: String,
-    /// Typeface.
+    /// Typeface of all letters.
     pub typeface: Typeface,
     /// Height of a capital letter, m.
     pub height_m: f64,
@@ -66,7 +66,7 @@ impl TextDecal {
         Self { line, coverage: OnceLock::new() }
     }
 
-    /// The rasterised glyphs.
+    /// The glyphs, rasterised at the first call.
     pub fn coverage(&self) -> &GlyphCoverage {
         self.coverage.get_or_init(|| GlyphCoverage::rasterize(&self.line))
     }
@@ -108,7 +108,7 @@ pub struct GlyphCoverage {
     size: [usize; 2],
     /// Row by row, one row and one column more than texels.
     sums: Vec<f64>,
-    /// Texels per metre.
+    /// Texels per metre of the surface.
     scale: f64,
     /// Row at half the height of a capital letter, texels.
     middle: f64,

@@ -36,7 +36,7 @@ pub struct Sky {
 pub struct Lighting {
     /// Key light, the only one that casts shadows.
     pub key: KeyLight,
-    /// Environment light.
+    /// Environment light from all directions.
     pub sky: Sky,
     /// Factor on the radiance that reaches the camera, before tone mapping.
     pub exposure: f64,

@@ -28,7 +28,7 @@ pub struct ColouredMesh {
     pub solid: Arc<MeshSolid>,
     /// Index of the material of each triangle of `solid`.
     pub material_ids: Arc<[u16]>,
-    /// The materials.
+    /// Materials, by the indices of `material_ids`.
     pub materials: Arc<[MeshMaterial]>,
 }
 

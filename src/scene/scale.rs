@@ -6,7 +6,7 @@ use softvt_geometry::{Vec3, shape::Shape};
 
 use super::{
     Body, Object, SoftMaterial,
-    decal::{LabelLine, TextDecal},
+    decal::TextDecal,
     visual::{Mask, Visual, VisualLayer},
 };
 
@@ -95,55 +95,41 @@ impl Visual {
 impl Mask {
     /// The mask of a surface at `scale` times the size: all lengths are multiplied.
     pub fn scaled(&self, scale: f64) -> Self {
-        let length = |metres: &f64| metres * scale;
-        let vector = |metres: &[f64; 3]| metres.map(|metres| metres * scale);
-        let inner = |mask: &Arc<Self>| Arc::new(mask.scaled(scale));
-        match self {
-            Self::Whole => Self::Whole,
-            Self::Checker { size_m } => Self::Checker { size_m: length(size_m) },
-            Self::Stripes { axis, pitch_m, share } => {
-                Self::Stripes { axis: *axis, pitch_m: length(pitch_m), share: *share }
+        let mut mask = self.clone();
+        match &mut mask {
+            Self::Whole | Self::Facing { .. } => {}
+            Self::Checker { size_m: length }
+            | Self::Stripes { pitch_m: length, .. }
+            | Self::Weave { pitch_m: length } => {
+                *length *= scale;
             }
-            Self::Gradient { axis, from_m, to_m } => {
-                Self::Gradient { axis: *axis, from_m: length(from_m), to_m: length(to_m) }
-            }
-            Self::Noise { size_m, octaves, from, to, seed } => {
-                Self::Noise { size_m: vector(size_m), octaves: *octaves, from: *from, to: *to, seed: *seed }
-            }
-            Self::Rings { centre_m, pitch_m, wobble_m, seed } => Self::Rings {
-                centre_m: vector(centre_m),
-                pitch_m: length(pitch_m),
-                wobble_m: length(wobble_m),
-                seed: *seed,
-            },
-            Self::Boards { length_m, width_m, seed } => {
-                Self::Boards { length_m: length(length_m), width_m: length(width_m), seed: *seed }
+            Self::Gradient { from_m: first, to_m: second, .. }
+            | Self::Boards { length_m: first, width_m: second, .. }
+            | Self::Specks { spacing_m: first, radius_m: second, .. } => {
+                *first *= scale;
+                *second *= scale;
             }
             Self::Seams { length_m, width_m, gap_m } => {
-                Self::Seams { length_m: length(length_m), width_m: length(width_m), gap_m: length(gap_m) }
+                [length_m, width_m, gap_m].into_iter().for_each(|length| *length *= scale);
             }
-            Self::Specks { spacing_m, radius_m, seed } => {
-                Self::Specks { spacing_m: length(spacing_m), radius_m: length(radius_m), seed: *seed }
+            Self::Noise { size_m, .. } => *size_m = size_m.map(|length| length * scale),
+            Self::Rings { centre_m, pitch_m, wobble_m, .. } => {
+                centre_m.iter_mut().chain([pitch_m, wobble_m]).for_each(|length| *length *= scale);
             }
-            Self::Weave { pitch_m } => Self::Weave { pitch_m: length(pitch_m) },
-            Self::Facing { axis, from, to } => Self::Facing { axis: *axis, from: *from, to: *to },
             Self::Inside { shape, soft_m } => {
-                Self::Inside { shape: Arc::new(resized(shape, scale)), soft_m: length(soft_m) }
+                *shape = Arc::new(resized(shape, scale));
+                *soft_m *= scale;
             }
             Self::Text { decal } => {
-                let line = &decal.line;
-                Self::Text {
-                    decal: Arc::new(TextDecal::new(LabelLine {
-                        height_m: length(&line.height_m),
-                        at: vector(&line.at),
-                        wrap_m: line.wrap_m.as_ref().map(length),
-                        ..line.clone()
-                    })),
-                }
+                let mut line = decal.line.clone();
+                let lengths = line.at.iter_mut().chain([&mut line.height_m]).chain(&mut line.wrap_m);
+                lengths.for_each(|length| *length *= scale);
+                *decal = Arc::new(TextDecal::new(line));
             }
-            Self::Inverse { mask } => Self::Inverse { mask: inner(mask) },
-            Self::Product { masks } => Self::Product { masks: masks.iter().map(inner).collect() },
+            Self::Inverse { mask } => *mask = Arc::new(mask.scaled(scale)),
+            Self::Product { masks } => masks.iter_mut().for_each(|mask| *mask = Arc::new(mask.scaled(scale))),
         }
+        mask
     }
 }
 

@@ -95,7 +95,7 @@ pub struct CameraVariation {
 pub struct SceneVariation {
     /// By name in the scene.
     pub objects: BTreeMap<String, ObjectVariation>,
-    /// The light.
+    /// Factors on the light.
     pub light: LightVariation,
     /// By name of the camera.
     pub cameras: BTreeMap<String, CameraVariation>,

@@ -68,7 +68,7 @@ pub struct VisualLayer {
 /// A weight in 0..=1 at every surface point of an object. Lengths are in metres, points in the object frame at rest.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub enum Mask {
-    /// 1 everywhere.
+    /// The weight is 1 everywhere.
     Whole,
     /// Alternating cubes of edge `size_m`, with a corner at the origin.
     Checker {
@@ -160,7 +160,7 @@ pub enum Mask {
     },
     /// Interior of a shape.
     Inside {
-        /// The shape.
+        /// Shape, object frame, m.
         shape: Arc<Shape>,
         /// Width of the transition, centred on the surface of the shape, m.
         soft_m: f64,
@@ -172,12 +172,12 @@ pub enum Mask {
     },
     /// One minus another mask.
     Inverse {
-        /// The other mask.
+        /// Mask whose weight is subtracted.
         mask: Arc<Mask>,
     },
     /// The product of masks (their intersection).
     Product {
-        /// The factors.
+        /// Masks whose weights are multiplied.
         masks: Vec<Arc<Mask>>,
     },
 }

@@ -3,14 +3,16 @@
 //! Layers, each of which uses those before it: `vm` (the sandboxed virtual machine), `schema` (declarations of records,
 //! classes and functions, and checks by them), `api` (everything a script can reach as `softvt.…`), `plan` (loading a
 //! file), `run` (episodes, experts, experiments). [`stubs`] writes the declarations for language servers and readers.
-#![warn(missing_docs, unreachable_pub)]
+#![warn(unreachable_pub)]
 
+#[macro_use]
+mod vm;
+#[macro_use]
+mod schema;
 mod api;
 mod plan;
 mod run;
-mod schema;
 pub mod stubs;
-mod vm;
 
 pub use api::envelope_plot::envelope_plot;
 pub use api::experiment_input::{ExperimentInput, ExperimentInputError};
@@ -19,10 +21,10 @@ pub use plan::{
     options::{OptionSpec, ScriptOptionValue},
     policy_file::{LuaPolicy, PolicyFile},
     profile_file::load_profile,
-    variation_file::{PlanVariationError, STANDARD_VARIATION, load_variation},
+    variation_file::{STANDARD_VARIATION, load_variation},
 };
 pub use run::{
-    episode::{EpisodeSetup, SceneBuilder, SceneChanges, ShiftError, check_shift},
+    episode::{EpisodeSetup, SceneBuilder, SceneChanges, check_shift},
     experiment::{Experiment, ExperimentRow, ExperimentSummary},
     expert::{BlindGrip, ExpertController, ExpertGrip},
 };

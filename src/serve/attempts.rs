@@ -15,15 +15,13 @@ use softvt_common::episode_id::EpisodeId;
 use softvt_common::parallel::lock;
 use softvt_rollout::Episode;
 
-/// State of the one attempt at an episode.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum AttemptState {
+pub(super) enum AttemptState {
     InProgress,
     /// Recorded, or lost.
     Over,
 }
 
-/// The attempts of all clients.
 pub(super) struct Attempts<'a> {
     recorder: Option<&'a EpisodeRecorder<'a>>,
     /// Episodes of the run in which an action was executed.
@@ -45,9 +43,6 @@ impl<'a> Attempts<'a> {
 
     /// The attempt at an episode whose first action was executed after a reset. `None` if an earlier one exists, or the
     /// episode is not one that the server records.
-    ///
-    /// # Errors
-    /// The recorder fails.
     pub(super) fn begin(&'a self, id: &EpisodeId) -> Result<Option<Attempt<'a>>, RequestError> {
         let Some(recorder) = self.recorder.filter(|recorder| (recorder.selects)(id)) else { return Ok(None) };
         match lock(&self.states).entry(id.clone()) {
@@ -64,20 +59,9 @@ impl<'a> Attempts<'a> {
             && lock(&self.states).get(id) != Some(&AttemptState::Over)
     }
 
-    /// Checks that no client but that of the attempt `own` has begun an attempt at the episode that is not over.
-    ///
-    /// # Errors
-    /// Another client has; the message begins with the type of the `request`.
-    pub(super) fn check_free(
-        &self,
-        request: &str,
-        id: &EpisodeId,
-        own: Option<&Attempt<'_>>,
-    ) -> Result<(), RequestError> {
-        self.lock_free(request, id, own).map(drop)
-    }
-
-    fn lock_free(
+    /// The states, if no client but the owner of `own` has begun an attempt at the episode that is not over. The
+    /// message of an error begins with the type of the `request`.
+    pub(super) fn lock_free(
         &self,
         request: &str,
         id: &EpisodeId,
@@ -85,22 +69,18 @@ impl<'a> Attempts<'a> {
     ) -> Result<MutexGuard<'_, BTreeMap<EpisodeId, AttemptState>>, RequestError> {
         let is_own = own.is_some_and(|attempt| attempt.id == *id);
         let states = lock(&self.states);
-        match states.get(id) {
-            Some(AttemptState::InProgress) if !is_own => Err(format!(
-                "{request}: task {}, episode {} is being recorded for another client; use it when that client is done, \
-                 or another episode",
-                id.task, id.episode
-            )
-            .into()),
-            _ => Ok(states),
+        if states.get(id) == Some(&AttemptState::InProgress) && !is_own {
+            let (task, episode) = (id.task, id.episode);
+            bail!(
+                "{request}: task {task}, episode {episode} is being recorded for another client; use it when that client \
+                 is done, or another episode"
+            );
         }
+        Ok(states)
     }
 
     /// Ends the client's `own` attempt at an episode, or rules out a later one of any client, which
     /// counts as an attempt.
-    ///
-    /// # Errors
-    /// As [`Self::check_free`], or the recorder fails.
     pub(super) fn exclude(
         &self,
         request: &str,
@@ -124,9 +104,6 @@ impl<'a> Attempts<'a> {
 
 impl Attempt<'_> {
     /// Records the episode, which is over. Returns false if the attempt was lost before.
-    ///
-    /// # Errors
-    /// The recorder fails.
     pub(super) fn record(self, episode: &Episode) -> Result<bool, RequestError> {
         if self.attempts.end(&self.id) != Some(AttemptState::InProgress) {
             return Ok(false);
@@ -197,18 +174,16 @@ mod tests {
     #[test]
     fn no_other_client_steps_an_episode_during_an_attempt() {
         let (lost, begun) = reports(|attempts| {
-            assert!(attempts.check_free("step", &id(0), None).is_ok(), "before the attempt");
+            assert!(attempts.lock_free("step", &id(0), None).is_ok(), "before the attempt");
             let first = attempts.begin(&id(0)).unwrap();
-            assert!(attempts.check_free("step", &id(0), first.as_ref()).is_ok(), "its own client");
-            assert!(attempts.check_free("step", &id(0), None).is_err(), "another client");
+            assert!(attempts.lock_free("step", &id(0), first.as_ref()).is_ok(), "its own client");
+            assert!(attempts.lock_free("step", &id(0), None).is_err(), "another client");
             let other = attempts.begin(&id(1)).unwrap();
-            assert!(
-                attempts.check_free("step", &id(0), other.as_ref()).is_err(),
-                "a client with an attempt at another episode"
-            );
-            assert!(attempts.check_free("step", &id(2), None).is_ok(), "another episode");
+            let another = attempts.lock_free("step", &id(0), other.as_ref()).is_err();
+            assert!(another, "a client with an attempt at another episode");
+            assert!(attempts.lock_free("step", &id(2), None).is_ok(), "another episode");
             drop(first);
-            assert!(attempts.check_free("step", &id(0), None).is_ok(), "after the attempt");
+            assert!(attempts.lock_free("step", &id(0), None).is_ok(), "after the attempt");
         });
         assert_eq!((lost.len(), begun.len()), (2, 2));
     }

@@ -49,15 +49,12 @@ pub struct EpisodeRecorder<'a> {
     pub report_lost: ReportLost<'a>,
 }
 
-/// Suites and settings of a server.
 pub struct ServerConfig<'a> {
     /// The suites. Requests without a suite mean the first one.
     pub suites: Vec<Suite>,
-    /// Encoding of observations and actions.
     pub profile: Profile,
     /// Effort of the gripper, N.
     pub effort_n: f64,
-    /// True if clients receive the true state.
     pub privileged: bool,
     /// Base seed of requests without one.
     pub seed: u64,
@@ -67,9 +64,7 @@ pub struct ServerConfig<'a> {
     pub split: EpisodeSplit,
     /// Hash of the scripts, shifts, settings and version. States of servers with another hash are refused.
     pub fingerprint: String,
-    /// Connections that are accepted.
     pub access: AccessRules,
-    /// Starts an episode.
     pub start_episode: StartEpisode<'a>,
     /// Records finished episodes; `None` if nothing is recorded.
     pub recorder: Option<EpisodeRecorder<'a>>,

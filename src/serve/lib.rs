@@ -1,6 +1,13 @@
 //! A server through which clients control episodes: reset, step, render, get and set the state. The protocol
 //! is described in `docs/serve.md`.
-#![warn(missing_docs, unreachable_pub)]
+#![warn(unreachable_pub)]
+
+/// Ends a function with an invalid request.
+macro_rules! bail {
+    ($($message:tt)*) => {
+        return Err($crate::config::RequestError::Invalid(format!($($message)*)))
+    };
+}
 
 mod attempts;
 mod config;

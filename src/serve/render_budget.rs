@@ -8,7 +8,6 @@ use softvt_policy::transport::POLL_INTERVAL;
 /// Maximum number of pixels of an image of a requested size, and of all images that are rendered at the same time.
 pub(super) const MAX_RENDER_PIXELS: usize = 1920 * 1080;
 
-/// Pixels of the images that are being rendered.
 #[derive(Debug, Default)]
 pub(super) struct RenderBudget {
     in_use: Mutex<usize>,

@@ -1,5 +1,7 @@
 //! Requests of clients and their validation.
 
+use std::fmt::Display;
+
 use rmpv::Value;
 
 use super::{
@@ -19,10 +21,8 @@ const MAX_QUOTED_CHARS: usize = 80;
 /// 2^53: from here on not every whole number is a double.
 const MAX_EXACT: f64 = 9_007_199_254_740_992.0;
 
-/// A valid request.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Request {
-    /// Start an episode.
     Reset(EpisodeId),
     /// Execute actions, at least one.
     Step(Vec<ActionRow>),
@@ -35,32 +35,23 @@ pub(super) enum Request {
         /// Height, pixels; `None` for the camera's own.
         height: Option<usize>,
     },
-    /// Return the matrices of the cameras.
     Cameras,
-    /// Return the state of the episode.
     GetState,
-    /// Restore a state.
     SetState(Box<EpisodeState>),
-    /// Close the connection.
     Close,
 }
 
-/// Types of requests, for messages.
 const TYPES: &str = "reset, step, render, cameras, get_state, set_state, close";
 
 impl Request {
-    /// Validates a message.
-    ///
-    /// # Errors
-    /// The message is not a request, or a field is unknown, missing or invalid.
     pub(super) fn read(message: &Value, config: &ServerConfig) -> Result<Self, RequestError> {
         if !message.is_map() {
             let what = kind(message);
-            return Err(format!("the message is {what}; expected a map with a type of {TYPES}").into());
+            bail!("the message is {what}; expected a map with a type of {TYPES}");
         }
         let Some(what) = entry(message, "type") else {
             let has = shortened(&names(message));
-            return Err(format!("the message has no type; expected one of {TYPES}; it has {has}").into());
+            bail!("the message has no type; expected one of {TYPES}; it has {has}");
         };
         let what =
             text(what).ok_or_else(|| format!("the type is {}; expected one of {TYPES}", kind(what)))?;
@@ -89,12 +80,11 @@ impl Request {
     }
 }
 
-/// Fields that identify an episode.
 const EPISODE_FIELDS: [&str; 5] = ["suite", "task", "episode", "seed", "split"];
 
 fn episode_id(fields: &RequestFields, config: &ServerConfig) -> Result<EpisodeId, RequestError> {
     let suite = fields.text("suite")?;
-    let suite = config.suite(suite.as_deref()).map_err(|error| fields.error(&error.to_string()))?;
+    let suite = config.suite(suite.as_deref()).map_err(|error| fields.error(error))?;
     let task = fields.required("task", fields.integer("task", u64::from(u32::MAX))?)? as usize;
     let episode = fields.required("episode", fields.integer("episode", u64::from(u32::MAX))?)? as u32;
     let base_seed = fields.integer("seed", u64::MAX)?.unwrap_or(config.seed);
@@ -105,11 +95,11 @@ fn episode_id(fields: &RequestFields, config: &ServerConfig) -> Result<EpisodeId
         None => config.split,
         Some(name) => name
             .parse::<EpisodeSplit>()
-            .map_err(|error| fields.error(&format!("split is {:?}; {error}", shortened(&name))))?,
+            .map_err(|error| fields.error(format_args!("split is {:?}; {error}", shortened(&name))))?,
     };
     if !suite.tasks.iter().any(|known| known.id == task) {
-        let message = format!("task {task}: suite {} has the {}", suite.name, task_list(suite));
-        return Err(fields.error(&message));
+        let tasks = task_list(suite);
+        return Err(fields.error(format_args!("task {task}: suite {} has the {tasks}", suite.name)));
     }
     Ok(EpisodeId { suite: suite.name.clone(), task, episode, base_seed, split })
 }
@@ -148,19 +138,20 @@ fn action_rows(
     let own = config.profile.actions.numbers();
     let expected = format!("expected shape ({own}) or (horizon, {own}), horizon up to {most}");
     let NumberArray { shape, values } =
-        numbers(value).map_err(|error| fields.error(&format!("the actions are {error}; {expected}")))?;
+        numbers(value).map_err(|error| fields.error(format_args!("the actions are {error}; {expected}")))?;
     match *shape.as_slice() {
         [0] => return Ok(Vec::new()),
         [0, width] if width == own => return Ok(Vec::new()),
         [width] if width == own => {}
         [horizon, width] if width == own && horizon <= most => {}
-        _ => return Err(fields.error(&format!("the actions have the shape {shape:?}; {expected}"))),
+        _ => return Err(fields.error(format_args!("the actions have the shape {shape:?}; {expected}"))),
     }
     let rows: Vec<ActionRow> = values.chunks_exact(own).map(<[f64]>::to_vec).collect();
     match rows.iter().position(|row| row.iter().any(|number| !number.is_finite())) {
         None => Ok(rows),
         Some(at) => {
-            Err(fields.error(&format!("action {at} is {:?}: it holds a number that is not finite", rows[at])))
+            Err(fields
+                .error(format_args!("action {at} is {:?}: it holds a number that is not finite", rows[at])))
         }
     }
 }
@@ -168,8 +159,8 @@ fn action_rows(
 fn state(fields: &RequestFields, config: &ServerConfig) -> Result<Request, RequestError> {
     let value = fields.required("state", fields.get("state"))?;
     if !value.is_map() {
-        let message = format!("state is {}; expected the state of a get_state response", kind(value));
-        return Err(fields.error(&message));
+        let kind = kind(value);
+        return Err(fields.error(format_args!("state is {kind}; expected the state of a get_state response")));
     }
     let known: Vec<&str> = EPISODE_FIELDS.into_iter().chain(["actions", "code", "made_by"]).collect();
     let inner = RequestFields::new("set_state: state", value, &known)?;
@@ -178,7 +169,7 @@ fn state(fields: &RequestFields, config: &ServerConfig) -> Result<Request, Reque
         ("made_by", config.fingerprint.clone(), "its scripts, shifts, settings or version differ"),
     ] {
         if inner.text(name)?.is_some_and(|theirs| theirs != own) {
-            return Err(inner.error(&format!("it comes from another server: {what}")));
+            return Err(inner.error(format_args!("it comes from another server: {what}")));
         }
     }
     let actions = inner.required("actions", inner.get("actions"))?;
@@ -186,7 +177,6 @@ fn state(fields: &RequestFields, config: &ServerConfig) -> Result<Request, Reque
     Ok(Request::SetState(Box::new(EpisodeState { id: episode_id(&inner, config)?, actions })))
 }
 
-/// The fields of a request.
 struct RequestFields<'a> {
     /// Prefix of error messages.
     context: &'a str,
@@ -195,9 +185,6 @@ struct RequestFields<'a> {
 
 impl<'a> RequestFields<'a> {
     /// Wraps the fields of a map.
-    ///
-    /// # Errors
-    /// A field is not in `known`.
     fn new(context: &'a str, map: &'a Value, known: &[&str]) -> Result<Self, RequestError> {
         let fields = Self { context, map };
         for (key, _) in map.as_map().into_iter().flatten() {
@@ -205,13 +192,13 @@ impl<'a> RequestFields<'a> {
             if !known.contains(&name.as_str()) {
                 let name = shortened(&name);
                 let known = known.join(", ");
-                return Err(fields.error(&format!("there is no field {name:?}; expected one of {known}")));
+                return Err(fields.error(format_args!("there is no field {name:?}; expected one of {known}")));
             }
         }
         Ok(fields)
     }
 
-    fn error(&self, what: &str) -> RequestError {
+    fn error(&self, what: impl Display) -> RequestError {
         RequestError::Invalid(format!("{}: {what}", self.context))
     }
 
@@ -221,13 +208,13 @@ impl<'a> RequestFields<'a> {
     }
 
     fn required<T>(&self, name: &str, value: Option<T>) -> Result<T, RequestError> {
-        value.ok_or_else(|| self.error(&format!("missing field {name}")))
+        value.ok_or_else(|| self.error(format_args!("missing field {name}")))
     }
 
     fn text(&self, name: &str) -> Result<Option<String>, RequestError> {
         let Some(value) = self.get(name) else { return Ok(None) };
         let found = text(value);
-        found.map(Some).ok_or_else(|| self.error(&format!("{name} is {}; expected text", kind(value))))
+        found.map(Some).ok_or_else(|| self.error(format_args!("{name} is {}; expected text", kind(value))))
     }
 
     /// A whole number from 0 to `most`: an integer, or a number or numpy scalar without a fraction.
@@ -241,7 +228,7 @@ impl<'a> RequestFields<'a> {
         });
         let fits = found.filter(|number| *number <= most);
         let error =
-            || self.error(&format!("{name} is {}; expected a whole number in 0..{most}", quote(value)));
+            || self.error(format_args!("{name} is {}; expected a whole number in 0..{most}", quote(value)));
         fits.map(Some).ok_or_else(error)
     }
 }
@@ -261,7 +248,6 @@ fn shortened(text: &str) -> String {
     cut.map_or_else(|| text.to_owned(), |(at, _)| format!("{}…", &text[..at]))
 }
 
-/// A value, for messages.
 fn quote(value: &Value) -> String {
     match value {
         Value::Integer(_) | Value::F32(_) | Value::F64(_) | Value::Boolean(_) => value.to_string(),

@@ -22,21 +22,17 @@ use softvt_policy::{
 use softvt_robot::rotation;
 use softvt_rollout::ObjectInstance;
 
-/// Version of the protocol.
 const PROTOCOL: u32 = 1;
 /// Field of a record that depends on how often the client requested images, not on its actions.
 const OBSERVATION_DEPENDENT: &str = "camera_inside";
 
-/// Result of a step.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct StepResult {
-    /// Number of actions that were executed.
     pub count: usize,
     /// True if the finished episode was recorded; `None` before its end, and if the server records nothing.
     pub recorded: Option<bool>,
 }
 
-/// A response of a type.
 pub(super) fn typed(kind: &str, entries: impl IntoIterator<Item = (&'static str, Value)>) -> Value {
     map([("type", Value::from(kind))].into_iter().chain(entries))
 }
@@ -77,9 +73,6 @@ pub fn hello(config: &ServerConfig, first: &Observation) -> Value {
 }
 
 /// The current observation, reward and info of an episode. `executed` is what a step did.
-///
-/// # Errors
-/// A sensor stream cannot be computed.
 pub(super) fn transition(
     kind: &str,
     live: &mut LiveEpisode,
@@ -127,7 +120,7 @@ pub(super) fn cameras(live: &LiveEpisode) -> Value {
     typed("cameras", [("cameras", map(entries))])
 }
 
-/// What clients with access to the true state need to read it: the goal, the pose of the robot's base in the world, and
+/// Scene data of clients with access to the true state: the goal, the pose of the robot's base in the world, and
 /// the names of all objects by their number in segmentations, from 1.
 fn scene(live: &LiveEpisode, config: &ServerConfig) -> serde_json::Value {
     let id = &live.state.id;
@@ -165,9 +158,9 @@ fn info(
     put("step", json!(live.state.actions.len()));
     put("time_s", json!(observation.time_s));
     put("success", json!(live.has_succeeded()));
-    put("far_commands", json!(live.episode.far_commands()));
-    put("clamped_grips", json!(live.episode.clamped_grips()));
-    put("clamped_steps", json!(live.episode.clamped_steps()));
+    put("far_commands", json!(live.episode.stats().far_commands));
+    put("clamped_grips", json!(live.episode.stats().clamped_grips));
+    put("clamped_steps", json!(live.episode.stats().clamped_steps));
     if let Some(StepResult { count, recorded }) = executed {
         put("carried_out", json!(count));
         if let Some(recorded) = recorded {

@@ -24,7 +24,6 @@ use softvt_policy::http::{self, HttpRequest, Refusal, SlotGuard};
 /// Connections accepted above `max_clients` while the type of their request is still unknown.
 const BACKLOG: usize = 64;
 
-/// Data that the threads of all clients share.
 struct ServerState<'a> {
     config: &'a ServerConfig<'a>,
     hello: Value,
@@ -66,7 +65,6 @@ fn answer(request: HttpRequest, state: &ServerState) {
     }
 }
 
-/// Responds to one message after another.
 fn run_session(mut connection: Connection, state: &ServerState) {
     if connection.send(&state.hello).is_err() {
         return;

@@ -19,7 +19,6 @@ use softvt_robot::Side;
 /// Copies of earlier states per client.
 const MAX_SNAPSHOTS: usize = 4;
 
-/// The session of one client.
 pub(super) struct ClientSession<'a> {
     config: &'a ServerConfig<'a>,
     render_budget: &'a RenderBudget,
@@ -33,7 +32,7 @@ pub(super) struct ClientSession<'a> {
 }
 
 impl<'a> ClientSession<'a> {
-    /// A session without an episode. Its images wait for `render_budget`; `attempts` are those of all clients;
+    /// A session without an episode. Its images wait for `render_budget`; `attempts` are of all clients;
     /// `cancel` interrupts long requests.
     pub(super) fn new(
         config: &'a ServerConfig<'a>,
@@ -97,14 +96,12 @@ impl<'a> ClientSession<'a> {
             }
         };
         for row in &state.actions[live.state.actions.len()..] {
-            self.check_cancel()?;
+            self.proceed()?;
             live.advance(self.config, row)?;
         }
         let (executed, all) = (live.state.actions.len(), state.actions.len());
         if executed < all {
-            let message =
-                format!("set_state: the episode ends after {executed} of the state's {all} actions");
-            return Err(message.into());
+            bail!("set_state: the episode ends after {executed} of the state's {all} actions");
         }
         self.attempt = None;
         self.live = Some(live);
@@ -122,23 +119,18 @@ impl<'a> ClientSession<'a> {
 
     fn step(&mut self, rows: &[ActionRow]) -> Result<Value, RequestError> {
         if self.live("step")?.episode.outcome().is_some() {
-            return Err("step: the episode is over; reset first".to_owned().into());
+            bail!("step: the episode is over; reset first");
         }
         let mut executed = 0;
         for row in rows {
-            self.check_cancel()?;
-            let config = self.config;
-            let (attempts, own) = (self.attempts, self.attempt.take());
-            let live = self.live("step")?;
-            let is_free = attempts.check_free("step", &live.state.id, own.as_ref());
-            self.attempt = own;
-            is_free?;
+            self.proceed()?;
+            let (config, id) = (self.config, self.live("step")?.state.id.clone());
+            drop(self.attempts.lock_free("step", &id, self.attempt.as_ref())?);
             let live = self.live("step")?;
             live.advance(config, row)?;
             executed += 1;
             let (count, is_over) = (live.state.actions.len(), live.episode.outcome().is_some());
             if count == 1 {
-                let id = live.state.id.clone();
                 self.attempt = self.attempts.begin(&id)?;
             }
             if is_over {
@@ -146,13 +138,8 @@ impl<'a> ClientSession<'a> {
             }
         }
         let recorded = self.record_if_over()?;
-        let config = self.config;
-        response::transition(
-            "step",
-            self.live("step")?,
-            config,
-            Some(StepResult { count: executed, recorded }),
-        )
+        let (config, done) = (self.config, StepResult { count: executed, recorded });
+        response::transition("step", self.live("step")?, config, Some(done))
     }
 
     /// Records the episode if it is over and this attempt at it counts. Returns whether it was recorded; `None` before
@@ -186,8 +173,7 @@ impl<'a> ClientSession<'a> {
             _ => None,
         };
         if finger.is_some() && (width.is_some() || height.is_some()) {
-            let message = format!("render: {camera}: tactile images have one size; omit width and height");
-            return Err(message.into());
+            bail!("render: {camera}: tactile images have one size; omit width and height");
         }
         let own = cameras.iter().find(|other| other.name == camera);
         let width_px = width.or(own.map(|own| own.width)).unwrap_or_default();
@@ -199,23 +185,21 @@ impl<'a> ClientSession<'a> {
             _ => false,
         });
         if !(is_observed || config.privileged) && attempts.is_open(&live.state.id) {
-            let message = format!(
+            bail!(
                 "render: {camera}: the profile {} does not observe it in this size, and the episode can be recorded; render \
                  what it observes, or another episode",
                 config.profile.name
             );
-            return Err(message.into());
         }
         let pixels = width_px * height_px;
         if (width.is_some() || height.is_some()) && pixels > MAX_RENDER_PIXELS {
-            let message = format!(
+            bail!(
                 "render: width × height is {width_px} × {height_px}; expected at most {MAX_RENDER_PIXELS} pixels \
                  (1920 × 1080)"
             );
-            return Err(message.into());
         }
         let Some(_permit) = budget.acquire(pixels, cancel) else {
-            return Err("the server is shutting down".to_owned().into());
+            bail!("the server is shutting down");
         };
         let image = match finger {
             Some(side) => live.episode.render_tactile(side),
@@ -232,10 +216,11 @@ impl<'a> ClientSession<'a> {
         Ok(response::typed("get_state", [("state", state)]))
     }
 
-    fn check_cancel(&self) -> Result<(), RequestError> {
-        match self.cancel.requested() {
-            true => Err("the server is shutting down".to_owned().into()),
-            false => Ok(()),
+    /// Ends a request once the server is cancelled.
+    fn proceed(&self) -> Result<(), RequestError> {
+        if self.cancel.requested() {
+            bail!("the server is shutting down");
         }
+        Ok(())
     }
 }

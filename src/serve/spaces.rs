@@ -1,4 +1,4 @@
-//! Spaces of observations and actions for clients: types, shapes and bounds. The bounds are those of possible values,
+//! Spaces of observations and actions for clients: types, shapes and bounds. The bounds are of possible values,
 //! not of likely ones.
 
 use std::collections::BTreeSet;

@@ -16,12 +16,9 @@ use softvt_rollout::{Episode, EpisodeError};
 /// The numbers of an action, in the encoding of the profile.
 pub(super) type ActionRow = Vec<f64>;
 
-/// State of an episode.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct EpisodeState {
-    /// The episode.
     pub id: EpisodeId,
-    /// Actions executed so far.
     pub actions: Vec<ActionRow>,
 }
 
@@ -36,7 +33,6 @@ impl EpisodeState {
         is_prefix.then(|| other.actions.len() - self.actions.len())
     }
 
-    /// Converts to msgpack.
     pub(super) fn to_value(&self, config: &ServerConfig) -> Value {
         let EpisodeId { suite, task, episode, base_seed, split } = &self.id;
         let data = self.actions.iter().flatten().flat_map(|number| number.to_le_bytes()).collect();
@@ -58,18 +54,13 @@ impl EpisodeState {
 /// An episode in progress. A clone continues independently and gives byte-identical results.
 #[derive(Clone)]
 pub(super) struct LiveEpisode {
-    /// Its id and the actions so far.
     pub state: EpisodeState,
-    /// The simulation.
     pub episode: Episode,
     resolver: CommandResolver,
 }
 
 impl LiveEpisode {
     /// Starts the episode of `state`, without its actions.
-    ///
-    /// # Errors
-    /// The episode cannot be started.
     pub(super) fn start(config: &ServerConfig, state: &EpisodeState) -> Result<Self, RequestError> {
         let mut episode = (config.start_episode)(&state.id)?;
         episode.begin(config.profile.streams());
@@ -78,17 +69,11 @@ impl LiveEpisode {
     }
 
     /// The observation of the profile in the current state.
-    ///
-    /// # Errors
-    /// A sensor stream cannot be computed.
     pub(super) fn observe(&mut self, config: &ServerConfig) -> Result<Observation, EpisodeError> {
         self.episode.observe(&config.profile.streams())
     }
 
     /// Executes an action of finite numbers. Does nothing once the episode has ended.
-    ///
-    /// # Errors
-    /// The action cannot be decoded, or a metric of the suite fails.
     pub(super) fn advance(&mut self, config: &ServerConfig, row: &ActionRow) -> Result<(), RequestError> {
         if self.episode.outcome().is_some() {
             return Ok(());
@@ -102,7 +87,6 @@ impl LiveEpisode {
         self.episode.take_metric_error().map_or(Ok(()), |message| Err(message.into()))
     }
 
-    /// True if the goal was reached.
     pub(super) fn has_succeeded(&self) -> bool {
         self.episode.outcome() == Some(&Outcome::Completed)
     }

@@ -18,7 +18,6 @@ pub(crate) struct Feed {
     viewers: Mutex<Viewers>,
 }
 
-/// The pages that receive the feed.
 #[derive(Debug, Default)]
 struct Viewers {
     count: usize,
@@ -40,12 +39,11 @@ impl Drop for Viewer<'_> {
 
 #[derive(Debug, Default)]
 struct Content {
-    /// Number of the episode.
     generation: u64,
     messages: Vec<Arc<Vec<u8>>>,
 }
 
-/// How far a page has read.
+/// Place of a page in the feed.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Place {
     generation: u64,
@@ -67,7 +65,6 @@ impl Feed {
         Viewer(self)
     }
 
-    /// True while no page is open.
     pub(crate) fn is_unwatched(&self) -> bool {
         self.viewers().count == 0
     }
@@ -78,7 +75,6 @@ impl Feed {
         viewers.count == 0 && viewers.left.is_none_or(|left| left.elapsed() > RETURN)
     }
 
-    /// Begins an episode with a first message.
     pub(crate) fn begin(&self, message: Vec<u8>) {
         let mut content = self.lock();
         content.generation += 1;
@@ -86,7 +82,6 @@ impl Feed {
         self.changed.notify_all();
     }
 
-    /// Appends a message.
     pub(crate) fn push(&self, message: Vec<u8>) {
         self.lock().messages.push(Arc::new(message));
         self.changed.notify_all();

@@ -26,9 +26,6 @@ pub(crate) struct MovingObject {
 }
 
 /// The message about the scene of an episode, and the objects whose poses each state has. `about` has further fields.
-///
-/// # Errors
-/// A mesh cannot be built.
 pub(crate) fn scene_message(
     episode: &mut Episode,
     about: Value,

@@ -3,8 +3,8 @@
 //!
 //! A [`Watch`] has one thread that simulates the episode that was asked for last and appends a message for every
 //! control step to a feed; a server answers the requests of browsers in a thread each, and sends the feed to each open
-//! page over a websocket. A script that is saved again starts its episode anew.
-#![warn(missing_docs, unreachable_pub)]
+//! page over a websocket. A script that is saved again starts its episode again.
+#![warn(unreachable_pub)]
 
 mod feed;
 mod geometry;

@@ -15,41 +15,33 @@ pub(crate) struct Menu {
 }
 
 impl Menu {
-    /// The suites of a script, with the policy `given` beside the built-in ones.
+    /// The suites of a script, with the policy `given` and the built-in ones.
     pub(crate) fn new(suites: &[Suite], given: &str) -> Self {
         Self { suites: suites.to_vec(), policies: policies(given) }
     }
 
-    /// # Errors
-    /// The suite, the task or the policy of a selection is unknown.
-    pub(crate) fn check(&self, selection: &Selection) -> Result<(), String> {
-        check_policy(&self.policies, &selection.policy)?;
-        if self.suites.is_empty() { Ok(()) } else { find_task(&self.suites, selection).map(drop) }
+    /// A message about a suite, task or policy that is unknown.
+    pub(crate) fn problem(&self, selection: &Selection) -> Option<String> {
+        let policy = unknown_policy(&self.policies, &selection.policy);
+        let has_suites = !self.suites.is_empty();
+        policy.or_else(|| has_suites.then(|| find_task(&self.suites, selection).err())?)
     }
 }
 
-/// Names of the policies that are offered: `given`, the built-in ones, and that of whoever drives the arm.
+/// Names of the policies that are offered: `given`, the built-in ones, and `teleop`.
 pub(crate) fn policies(given: &str) -> Vec<String> {
     let others = BuiltinPolicy::all().map(BuiltinPolicy::name).chain([TELEOP]);
     let others = others.filter(|name| *name != given);
     iter::once(given.to_owned()).chain(others.map(str::to_owned)).collect()
 }
 
-/// # Errors
-/// No policy has the name.
-pub(crate) fn check_policy(policies: &[String], name: &str) -> Result<(), String> {
-    if name.is_empty() || policies.is_empty() || policies.iter().any(|known| known == name) {
-        return Ok(());
-    }
-    let close = text::suggest(name, policies.iter().map(String::as_str));
-    let hint = close.map_or(String::new(), |close| format!("; did you mean {close}?"));
-    Err(format!("policy: expected {}, got {name:?}{hint}", policies.join(", ")))
+/// A message about a name that no policy has; an empty one is that of the configuration.
+pub(crate) fn unknown_policy(policies: &[String], name: &str) -> Option<String> {
+    let is_known = name.is_empty() || policies.is_empty() || policies.iter().any(|known| known == name);
+    (!is_known).then(|| text::unknown_name("policy", name, policies.iter().map(String::as_str)))
 }
 
 /// The selected task, of the first suite if none is named.
-///
-/// # Errors
-/// There is no suite, or none of this name, or it has no such task.
 pub(crate) fn find_task<'a>(
     suites: &'a [Suite],
     selection: &Selection,

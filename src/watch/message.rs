@@ -6,7 +6,6 @@
 
 use serde_json::{Value, json};
 
-/// A message in the making.
 #[derive(Debug, Default)]
 pub(crate) struct Message {
     blobs: Vec<Vec<u8>>,
@@ -29,7 +28,6 @@ impl Message {
         self.bytes(numbers.into_iter().flat_map(u32::to_le_bytes).collect())
     }
 
-    /// The message with the JSON object `content`.
     pub(crate) fn finish(self, mut content: Value) -> Vec<u8> {
         content["blobs"] = json!(self.blobs.iter().map(Vec::len).collect::<Vec<_>>());
         let mut text = content.to_string().into_bytes();

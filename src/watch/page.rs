@@ -1,14 +1,11 @@
 //! The files of the page, which the program contains.
 
-/// A file of the page.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct PageFile {
     pub(crate) content: &'static [u8],
-    /// Media type.
     pub(crate) kind: &'static str,
 }
 
-/// The file at a path of the server.
 pub(crate) fn file(path: &str) -> Option<PageFile> {
     let (content, kind): (&[u8], _) = match path {
         "/" => (include_bytes!("page/index.html"), "text/html; charset=utf-8"),

@@ -31,7 +31,6 @@ use softvt_common::cancel;
 use softvt_policy::{
     access::{AccessRules, is_same_secret},
     http::{self, HttpRequest, Refusal},
-    transport::send_frame,
 };
 
 /// Connections at a time, open pages included.
@@ -39,7 +38,7 @@ const MAX_CONNECTIONS: usize = 128;
 /// Longest message of a page over the websocket, bytes; it sends none.
 const MAX_MESSAGE_BYTES: usize = 1 << 10;
 
-/// What requests read and change.
+/// Shared state of the request handlers.
 struct Page<'a> {
     access: &'a Access,
     feed: Arc<Feed>,
@@ -48,7 +47,7 @@ struct Page<'a> {
     menu: Arc<Mutex<Menu>>,
 }
 
-/// Who may send requests.
+/// The rules of requests.
 struct Access {
     address: SocketAddr,
     rules: AccessRules,
@@ -63,9 +62,6 @@ pub struct Watch {
 
 impl Watch {
     /// Listens at a port of this machine, 0 for any free one. Pages state `token`.
-    ///
-    /// # Errors
-    /// The port cannot be used.
     pub fn listen(port: u16, token: String) -> io::Result<Self> {
         let listener = http::listen(&Ipv4Addr::LOCALHOST.to_string(), port)?;
         let address = listener.local_addr()?;
@@ -73,7 +69,6 @@ impl Watch {
         Ok(Self { listener, access: Access { address, rules, token } })
     }
 
-    /// Address of the page.
     pub fn url(&self) -> String {
         format!("http://{}/?token={}", self.access.address, self.access.token)
     }
@@ -102,7 +97,6 @@ impl Watch {
 }
 
 impl Page<'_> {
-    /// Answers one request.
     fn answer(&self, mut request: HttpRequest) {
         let (method, url) = (request.head.method().clone(), request.head.uri().clone());
         let (path, query) = (url.path(), url.query().unwrap_or_default());
@@ -130,20 +124,14 @@ impl Page<'_> {
     }
 
     /// Selects an episode. All pages receive what is wrong with it, if anything is, as the error of its simulation.
-    ///
-    /// # Errors
-    /// The script has no such suite or task, or there is no such policy.
     fn select(&self, selection: Selection) -> Result<(), Refusal> {
-        let checked = self.menu.lock().unwrap_or_else(PoisonError::into_inner).check(&selection);
+        let problem = self.menu.lock().unwrap_or_else(PoisonError::into_inner).problem(&selection);
         // The thread that simulates ends with the program only.
         let _ = self.selections.send(selection);
-        checked.map_err(bad_request)
+        problem.map_or(Ok(()), |problem| Err(bad_request(problem)))
     }
 
     /// Sets what the page drives the arm by.
-    ///
-    /// # Errors
-    /// It is no such object, or out of range.
     fn set_drive(&self, request: &mut HttpRequest) -> Result<(), Refusal> {
         let drive: Drive = read_json(request)?;
         drive.check().map_err(bad_request)?;
@@ -162,6 +150,7 @@ impl Access {
 /// Sends the feed over a websocket until the page closes.
 fn send_feed(request: HttpRequest, feed: &Feed) {
     let Some(mut socket) = request.upgrade(MAX_MESSAGE_BYTES) else { return };
+    socket.get_mut().wait_until(None);
     let (mut place, _viewer) = (Place::default(), feed.enter());
     loop {
         let message = match feed.next(place) {
@@ -172,17 +161,13 @@ fn send_feed(request: HttpRequest, feed: &Feed) {
             // Shows whether the page is still open.
             None => WebsocketMessage::Ping(Default::default()),
         };
-        let go_on = || if cancel::requested() { Err(()) } else { Ok(()) };
-        if go_on().and_then(|()| send_frame(&mut socket, message, go_on).map_err(drop)).is_err() {
+        if cancel::requested() || socket.send(message).is_err() {
             return;
         }
     }
 }
 
 /// The content of a request.
-///
-/// # Errors
-/// It is too long, or no such JSON object.
 fn read_json<T: DeserializeOwned>(request: &mut HttpRequest) -> Result<T, Refusal> {
     let body = request.read_body()?;
     // A list would be read as the fields in their order.

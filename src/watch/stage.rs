@@ -30,30 +30,26 @@ use softvt_runner::{
     suite_selection::{select_episodes, select_tasks, suites_of},
 };
 
-/// How often saved files are looked for.
+/// Interval at which saved files are looked for.
 const POLL: Duration = Duration::from_millis(200);
 
-/// What a [`Watch`](crate::Watch) shows.
+/// Script, first episode and split of a [`Watch`](crate::Watch).
 pub struct Program {
-    /// The script, the changes of its scenes, and the policy that is offered beside the built-in ones.
+    /// The script, the changes of its scenes, and the policy that is offered with the built-in ones.
     pub config: RunConfig,
-    /// The first episode.
     pub selection: Selection,
     /// Split of the episodes. Those that are driven from the page and recorded are of the demonstration split.
     pub split: EpisodeSplit,
 }
 
-/// An episode under a policy.
 #[derive(Clone, Debug, Default, Deserialize, PartialEq, Eq)]
 #[serde(deny_unknown_fields)]
 pub struct Selection {
     /// Name of the suite; empty for the first one.
     #[serde(default)]
     pub suite: String,
-    /// Index of the task.
     #[serde(default)]
     pub task: usize,
-    /// Number of the episode.
     #[serde(default)]
     pub episode: u32,
     /// Name of the policy; empty for that of the configuration.
@@ -64,7 +60,6 @@ pub struct Selection {
 /// Sizes and times of the files of a script.
 type Versions = BTreeMap<PathBuf, Option<(u64, SystemTime)>>;
 
-/// The state of the thread.
 pub(crate) struct Stage {
     pub(crate) program: Program,
     pub(crate) feed: Arc<Feed>,
@@ -108,17 +103,14 @@ impl Stage {
         self.is_outdated || cancel::requested()
     }
 
-    /// Simulates the selected episode and tells its states.
-    ///
-    /// # Errors
-    /// The script, the selection, the scene or the policy is not valid, or the episode is outdated.
+    /// Simulates the selected episode and publishes its states.
     fn simulate(&mut self) -> Result<(), RunError> {
         let config = self.program.config.clone();
         let main = config.file.clone();
         // Versions are those before the script is read, so that no later one is missed. Until it is loaded, its
-        // files are those of before, and all scripts beside it: one of them may have the error.
+        // files are those of before, and all scripts in its folder: one of them may have the error.
         self.files.entry(main.clone()).or_default();
-        for path in scripts_beside(&main) {
+        for path in scripts_near(&main) {
             self.files.entry(path).or_default();
         }
         self.files.iter_mut().for_each(|(path, version)| *version = version_of(path));
@@ -148,14 +140,13 @@ impl Stage {
         let (suite, task) = found.map_err(|problem| config.error(problem))?;
         let job = EpisodeJob { task, episode: self.program.selection.episode };
         let is_recorded = config.policy.name == TELEOP && config.out.is_some();
-        let (jobs, out, split) = match &config.out {
-            Some(out) if is_recorded => {
-                let jobs = select_episodes(&config, suite, &select_tasks(&config, suite)?);
-                (jobs, out.clone(), EpisodeSplit::Demonstration)
-            }
-            _ => (EpisodeList::listed(vec![job]), PathBuf::new(), self.program.split),
+        let (jobs, split) = if is_recorded {
+            (select_episodes(&config, suite, &select_tasks(&config, suite)?), EpisodeSplit::Demonstration)
+        } else {
+            (EpisodeList::listed(vec![job]), self.program.split)
         };
-        let mut run = SuiteRun::of_split(&config, &script, suite, jobs, out, split)?;
+        let mut run = SuiteRun::new(&config, &script, suite, jobs, split)?;
+        run.out = config.out.clone().filter(|_| is_recorded);
         if config.policy.name == TELEOP {
             run.controllers = self.teleop();
         }
@@ -165,31 +156,28 @@ impl Stage {
         }
         let finished = match config.policy.name.as_str() {
             TELEOP => self.drive(&run, job)?,
-            _ => self.simulate_told(&run, job)?,
+            _ => self.simulate_shown(&run, job)?,
         };
         self.feed.push(end_message(&finished));
         Ok(())
     }
 
-    /// Begins the messages of an episode, and tells what pages may select.
+    /// Begins the messages of an episode with the choices of the page.
     fn begin(&self, file: &str, suites: &[Suite]) {
         let menu = Menu::new(suites, &self.program.config.policy.name);
         *self.menu.lock().unwrap_or_else(PoisonError::into_inner) = menu;
         self.feed.begin(plain(opening(file, suites, &self.program)));
     }
 
-    /// Simulates an episode and tells its states.
-    fn simulate_told(&mut self, run: &PreparedRun, job: EpisodeJob) -> Result<FinishedEpisode, RunError> {
+    /// Simulates an episode and publishes its states.
+    fn simulate_shown(&mut self, run: &PreparedRun, job: EpisodeJob) -> Result<FinishedEpisode, RunError> {
         let mut moving: Option<Vec<MovingObject>> = None;
-        run.run_episode_watched(job, &mut |episode| self.tell(episode, &mut moving))
+        run.run_episode_watched(job, &mut |episode| self.publish(episode, &mut moving))
     }
 
     /// Simulates an episode that is driven from the page.
-    ///
-    /// # Errors
-    /// As [`Self::simulate_told`], or the page was closed before the end.
     fn drive(&mut self, run: &PreparedRun, job: EpisodeJob) -> Result<FinishedEpisode, RunError> {
-        let driven = self.simulate_told(run, job);
+        let driven = self.simulate_shown(run, job);
         // A page that is loaded again may come back.
         while driven.is_ok() && self.feed.is_unwatched() && !self.feed.is_abandoned() {
             std::thread::sleep(POLL);
@@ -204,9 +192,6 @@ impl Stage {
 
     /// Simulates an episode that is driven from the page, and adds it to the run folder of the configuration. Whether
     /// it can be added is known before it is driven.
-    ///
-    /// # Errors
-    /// The folder holds another run or the episode already, or cannot be written, or the episode is not finished.
     fn drive_and_record(
         &mut self,
         config: &RunConfig,
@@ -216,7 +201,7 @@ impl Stage {
         let id = run.episode_id(job.task, job.episode);
         let served = ServedRuns::open(config, std::slice::from_ref(run), Arc::default())?;
         let recorder = served.recorder();
-        let (out, index) = (run.out.display(), id.index());
+        let (out, index) = (config.out.as_deref().unwrap_or(Path::new("")).display(), id.index());
         let driven = if (recorder.selects)(&id) {
             self.drive(run, job).inspect_err(|_| {
                 config.notice(format!(
@@ -241,14 +226,13 @@ impl Stage {
         recorded.and(written)
     }
 
-    /// Makes controllers that are driven from the page.
     fn teleop(&self) -> ControllerFactory {
         let input = self.drive.clone();
         Box::new(move |_, _| Ok(Box::new(TeleopController::new(input.clone()))))
     }
 
-    /// Tells the present state, and the scene before the first one.
-    fn tell(
+    /// Publishes the present state, and the scene before the first one.
+    fn publish(
         &mut self,
         episode: &mut Episode,
         moving: &mut Option<Vec<MovingObject>>,
@@ -274,14 +258,13 @@ impl Stage {
     }
 
     /// The policy of the selection.
-    ///
-    /// # Errors
-    /// The name is not that of a policy.
     fn policy(&self) -> Result<PolicyConfig, RunError> {
         let (name, given) = (&self.program.selection.policy, &self.program.config.policy);
-        menu::check_policy(&menu::policies(&given.name), name).map_err(RunError::input)?;
+        if let Some(problem) = menu::unknown_policy(&menu::policies(&given.name), name) {
+            return Err(RunError::input(problem));
+        }
         match name.as_str() {
-            // Whoever drives the arm sees the true state on the page.
+            // The page shows the true state.
             TELEOP => {
                 let mut policy = PolicyConfig::external(TELEOP);
                 policy.privileged = true;
@@ -293,8 +276,7 @@ impl Stage {
     }
 }
 
-/// The scripts in the folder of a script.
-fn scripts_beside(script: &Path) -> Vec<PathBuf> {
+fn scripts_near(script: &Path) -> Vec<PathBuf> {
     let folder = script.parent().unwrap_or(Path::new(""));
     let listed = if folder.as_os_str().is_empty() { Path::new(".") } else { folder };
     let entries = std::fs::read_dir(listed).into_iter().flatten().filter_map(Result::ok);
@@ -307,7 +289,7 @@ fn version_of(path: &PathBuf) -> Option<(u64, SystemTime)> {
     Some((metadata.len(), metadata.modified().ok()?))
 }
 
-/// What a page needs before the scene: what can be selected, and what is.
+/// Contents of the first message of an episode: the choices of the page, and the present one.
 fn opening(file: &str, suites: &[Suite], program: &Program) -> Value {
     let given = program.config.policy.name.as_str();
     let task = |task: &Task| json!({ "id": task.id, "prompt": task.prompt });

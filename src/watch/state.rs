@@ -16,9 +16,6 @@ use softvt_rollout::{Episode, SensingError, Sensors, StateDeformation};
 const JPEG_QUALITY: u8 = 85;
 
 /// The message about the present state.
-///
-/// # Errors
-/// A tactile picture cannot be computed.
 pub(crate) fn state_message(episode: &mut Episode, moving: &[MovingObject]) -> Result<Vec<u8>, SensingError> {
     let mut message = Message::default();
     let mut tactile = Vec::new();
@@ -58,7 +55,7 @@ pub(crate) fn state_message(episode: &mut Episode, moving: &[MovingObject]) -> R
     Ok(message.finish(content))
 }
 
-/// What the judge and the robot measure.
+/// Measurements of the judge and the robot.
 fn measured(episode: &Episode) -> Value {
     let (trace, record) = (episode.trace(), episode.record(None));
     let verdict = &record.verdict;

@@ -15,7 +15,6 @@ use softvt_policy::{Action, Observation, PolicyError};
 use softvt_robot::rotation;
 use softvt_rollout::{Controller, Simulation};
 
-/// Name of the policy.
 pub(crate) const TELEOP: &str = "teleop";
 
 /// Speed of the tool, m/s; its rate of turn, rad/s; and that of the closure, 1/s, at full deflection.
@@ -27,21 +26,17 @@ const MAX_LEAD: f64 = 0.05;
 /// Time after which the last input counts as none, s: a page that has closed lets the tool stand.
 const HOLD: Duration = Duration::from_millis(300);
 
-/// What a person asks for: shares of the largest rates, −1 to 1.
+/// Input from a page: shares of the largest rates, −1 to 1.
 #[derive(Clone, Copy, Debug, Default, Deserialize, PartialEq)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct Drive {
     /// Motion of the tool along the axes of the robot's base.
     pub(crate) translate: [f64; 3],
-    /// Turn about the vertical axis.
     pub(crate) turn: f64,
-    /// Closing of the gripper.
     pub(crate) close: f64,
 }
 
 impl Drive {
-    /// # Errors
-    /// A number is not in −1..=1.
     pub(crate) fn check(&self) -> Result<(), String> {
         let range = Range::closed(-1.0, 1.0);
         let numbers = self.translate.iter().chain([&self.turn, &self.close]);
@@ -61,7 +56,6 @@ impl DriveInput {
         *self.0.lock().unwrap_or_else(PoisonError::into_inner) = Some((Instant::now(), drive));
     }
 
-    /// The present input.
     fn now(&self) -> Drive {
         let last = *self.0.lock().unwrap_or_else(PoisonError::into_inner);
         last.filter(|(at, _)| at.elapsed() < HOLD).map_or(Drive::default(), |(_, drive)| drive)

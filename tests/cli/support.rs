@@ -15,7 +15,7 @@ use assert_cmd::{
 #[path = "../project/mod.rs"]
 mod project;
 
-pub use project::{Project, SOLIDS, SPATIAL_SOFT, Small, client, files, fixtures};
+pub use project::{Project, Small, client, files};
 
 /// Exit code and output of a command.
 pub struct CliOutput {
@@ -47,14 +47,7 @@ impl Project {
         refusal(self.softvt(words), words)
     }
 
-    /// The message for results with a problem. Standard output must have them.
-    pub fn problem(&self, words: &str) -> String {
-        let output = self.softvt(words);
-        assert_ne!(output.out, "", "softvt {words}\n{}", output.err);
-        refusal(CliOutput { out: String::new(), ..output }, words)
-    }
-
-    /// Starts a command.
+    /// Starts a command in the folder of the project.
     pub fn start(&self, words: &str) -> Process {
         Process::start(process::Command::new(cargo_bin!("softvt")), self, words)
     }
@@ -78,7 +71,7 @@ pub fn refusal(output: CliOutput, words: &str) -> String {
 /// A running command, which ends with the test.
 pub struct Process {
     child: Child,
-    out: Option<BufReader<ChildStdout>>,
+    out: BufReader<ChildStdout>,
     err: BufReader<ChildStderr>,
 }
 
@@ -100,7 +93,7 @@ impl Process {
             .stderr(Stdio::piped())
             .spawn()
             .expect("started");
-        let out = child.stdout.take().map(BufReader::new);
+        let out = BufReader::new(child.stdout.take().expect("output"));
         let err = BufReader::new(child.stderr.take().expect("messages"));
         Self { child, out, err }
     }
@@ -108,7 +101,7 @@ impl Process {
     /// The next line of standard output.
     pub fn line(&mut self) -> String {
         let mut line = String::new();
-        self.out.as_mut().expect("an output").read_line(&mut line).expect("a line");
+        self.out.read_line(&mut line).expect("a line");
         line.trim_end().to_owned()
     }
 
@@ -139,18 +132,12 @@ impl Process {
         drop(self.child.stdin.take());
     }
 
-    pub fn close_stdout(&mut self) {
-        self.out = None;
-    }
-
     /// Waits for the end. Returns what was not read before.
     pub fn wait(mut self) -> CliOutput {
         let (mut out, mut err) = (String::new(), String::new());
         thread::scope(|scope| {
             scope.spawn(|| self.err.read_to_string(&mut err).expect("text"));
-            if let Some(stream) = &mut self.out {
-                stream.read_to_string(&mut out).expect("text");
-            }
+            self.out.read_to_string(&mut out).expect("text");
         });
         let code = self.child.wait().expect("ended").code().unwrap_or(-1);
         CliOutput { code, out, err }

@@ -13,7 +13,7 @@ use tungstenite::{Message, WebSocket};
 
 use crate::support::{Process, Project, Small, refusal};
 
-/// A page.
+/// A process of `softvt watch` and the address of its page.
 struct Page {
     process: Process,
     /// `HOST:PORT`.
@@ -63,7 +63,7 @@ impl Page {
     }
 }
 
-/// What a page receives.
+/// Messages that a page receives.
 struct Feed(WebSocket<TcpStream>);
 
 impl Feed {
@@ -130,8 +130,8 @@ fn a_page_receives_the_scene_and_every_state_and_selects_episodes() {
     for (selection, expected) in [
         (json!({ "task": 99 }), "one has no task 99; its tasks are 0 to 0"),
         (json!({ "suite": "two" }), "unknown suite \"two\"; there are one"),
-        (json!({ "policy": "expret" }), "did you mean expert?"),
-        (json!({ "policy": "nobody" }), "random, teleop, got \"nobody\""),
+        (json!({ "policy": "expret" }), "did you mean \"expert\"?"),
+        (json!({ "policy": "nobody" }), "unknown policy \"nobody\"; there are "),
     ] {
         let (status, text) = page.post("/select", &selection);
         assert!(status == 400 && text.contains(expected), "{status}: {text}");
@@ -301,23 +301,6 @@ fn a_drive_ends_with_its_page_and_goes_on_when_it_is_loaded_again() {
     drop(feed);
     assert_eq!(page.feed().until("end").1, 101);
     page.process.await_message("[1/", 1);
-}
-
-#[test]
-fn what_cannot_be_shown_is_refused() {
-    let project = project();
-    project.succeeds("x.lua --out run");
-    for (words, expected) in [
-        ("watch run --seed 3", "--seed: has no effect on the run run; leave it out"),
-        ("watch run --policy noop", "--policy: has no effect on the run run; leave it out"),
-        ("watch run --task cube", "--task: expected the index"),
-        ("watch run --episode 9", "run: the run has no episode 9 of task 0; it has 0"),
-        ("watch run --task 5", "run: the run has no episode of task 5"),
-        ("compare run run", "run and run are the same folder; give different runs"),
-    ] {
-        let message = project.refusal(words);
-        assert!(message.contains(expected), "{words}: {message}");
-    }
 }
 
 #[cfg(unix)]

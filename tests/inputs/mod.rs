@@ -1,4 +1,4 @@
-//! Fixtures: files of small inputs, whose answers are compared with one snapshot beside each file.
+//! Fixtures: files of small inputs, whose answers are compared with one snapshot per file.
 //!
 //! What is above the line `---` is common to the inputs below it, which blank lines separate. `...` in it stands for an
 //! input; without it, an input follows. What is in front of an input is joined to one line, so that its own lines start

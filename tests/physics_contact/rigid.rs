@@ -14,16 +14,6 @@ fn position(world: &World, body: RigidId) -> Vec3 {
 }
 
 #[test]
-fn a_box_of_a_kilogram_sinks_less_than_fifty_micrometres() {
-    let mut world = world();
-    floor(&mut world, friction(0.6, 0.5));
-    let body = rigid(&mut world, &cuboid(0.05, 0.05, 0.05), 1.0, at(0.0, 0.0, 0.025), friction(0.6, 0.5));
-    run(&mut world, 1.0);
-    let sunk = 0.025 - position(&world, body).z;
-    assert!(sunk > 0.0 && sunk < 5e-5, "{sunk} m");
-}
-
-#[test]
 fn a_thousandfold_mass_rests_on_a_light_box() {
     let mut world = world();
     floor(&mut world, friction(0.6, 0.5));
@@ -63,11 +53,7 @@ fn a_lathe_bowl_stands_on_its_foot() {
     floor(&mut world, friction(0.6, 0.5));
     let profile = vec![[0.0, 0.0], [0.03, 0.0], [0.05, 0.03], [0.046, 0.03], [0.028, 0.005], [0.0, 0.005]];
     let bowl = Shape::lathe(profile).expect("a bowl");
-    let inertia = nalgebra::Matrix3::from_diagonal(&Vec3::new(1.5e-4, 1.5e-4, 2e-4));
-    let body = softvt::physics::rigid::RigidState::new(&at(0.0, 0.0, 0.002), Vec3::z() * 0.012, 0.2, inertia)
-        .expect("a real body");
-    let index = world.add_rigid("bowl", body);
-    world.add_shape("bowl", index, Pose::identity(), &bowl, friction(0.6, 0.5));
+    let index = rigid(&mut world, &bowl, 0.2, at(0.0, 0.0, 0.002), friction(0.6, 0.5));
     run(&mut world, 1.0);
     let object = world.rigid(index).state.object_w();
     let tilt = (object.rotation * Vec3::z()).angle(&Vec3::z());
@@ -100,14 +86,10 @@ fn a_cone_stays_on_its_side_on_a_thin_shelf() {
     let shelf = cuboid(0.2, 0.2, 0.004);
     world.add_shape("shelf", BodyId::World, Pose::translation(0.0, 0.0, -0.002), &shelf, friction(0.6, 0.5));
     let cone = Shape::lathe(vec![[0.0, -0.01], [0.01, 0.01], [0.0, 0.01]]).expect("a cone");
-    let inertia = nalgebra::Matrix3::from_diagonal(&Vec3::repeat(4e-6));
     // On its side, the axis rises from the tip by half the opening angle.
     let half_angle = 0.5_f64.atan();
     let pose = turned(at(0.0, 0.0, 0.01 * half_angle.sin() + 1e-3), Vec3::y() * (FRAC_PI_2 - half_angle));
-    let body =
-        softvt::physics::rigid::RigidState::new(&pose, Vec3::z() * 0.005, 0.1, inertia).expect("a real body");
-    let index = world.add_rigid("cone", body);
-    world.add_shape("cone", index, Pose::identity(), &cone, friction(0.6, 0.5));
+    let index = rigid(&mut world, &cone, 0.1, pose, friction(0.6, 0.5));
     world.rigid_mut(index).state.v = Vec3::y() * 0.05;
     for tenth in 0..30 {
         run(&mut world, 0.1);
@@ -125,7 +107,7 @@ fn fast_bodies_are_stopped_by_a_thin_shelf() {
     let ball = Shape::Sphere { radius: 0.01 };
     let die = cuboid(0.01, 0.01, 0.01);
     let cone = Shape::lathe(vec![[0.0, -0.01], [0.01, 0.01], [0.0, 0.01]]).expect("a cone");
-    for (shape, carrier) in [(&ball, &ball), (&die, &die), (&cone, &ball)] {
+    for shape in [ball, die, cone] {
         let mut world = world();
         world.add_shape(
             "shelf",
@@ -135,13 +117,7 @@ fn fast_bodies_are_stopped_by_a_thin_shelf() {
             friction(0.6, 0.5),
         );
         let pose = turned(at(0.01, 0.02, 0.1), Vec3::new(0.5, 0.3, 0.0));
-        let body = rigid(&mut world, carrier, 0.1, pose, friction(0.6, 0.5));
-        if shape != carrier {
-            let last = world.add_rigid("cone", world.rigid(body).state.clone());
-            world.add_shape("cone", last, Pose::identity(), shape, friction(0.6, 0.5));
-            world.rigid_mut(body).state.pose_w.translation.vector.x += 10.0;
-        }
-        let body = RigidId::new(world.rigid_bodies().len() - 1);
+        let body = rigid(&mut world, &shape, 0.1, pose, friction(0.6, 0.5));
         world.rigid_mut(body).state.v = Vec3::z() * -5.0;
         run(&mut world, 0.5);
         let z = position(&world, body).z;

@@ -19,7 +19,7 @@ struct Rest {
 fn rest(shape: &Shape, mass: f64, object_w: Pose, support: &dyn Fn(&mut World)) -> Rest {
     let mut world = world();
     support(&mut world);
-    let body = uniform(&mut world, shape, mass, object_w, friction(0.6, 0.5));
+    let body = rigid(&mut world, shape, mass, object_w, friction(0.6, 0.5));
     run(&mut world, 1.0);
     let body = &world.rigid(body).state;
     let now = body.object_w();
@@ -180,7 +180,7 @@ fn an_egg_rolls_from_rest_on_half_a_degree_as_a_ball_does() {
     let mut world = tilted(slope);
     flat(&mut world);
     let egg = Shape::Ellipsoid { radii: Vec3::new(0.02, 0.03, 0.02) };
-    let body = uniform(&mut world, &egg, 0.1, at(0.0, 0.0, 0.02), friction(0.6, 0.5));
+    let body = rigid(&mut world, &egg, 0.1, at(0.0, 0.0, 0.02), friction(0.6, 0.5));
     run(&mut world, 0.2);
     let before = world.rigid(body).state.v.x;
     run(&mut world, 0.3);
@@ -194,7 +194,7 @@ fn a_box_with_rounded_edges_sticks_below_its_angle_and_slides_above_it() {
     let on_slope = |angle: f64| {
         let mut world = world();
         floor(&mut world, friction(0.6, 0.4));
-        let body = uniform(&mut world, &shape, 0.3, at(0.0, 0.0, 0.01), friction(0.0, 0.0));
+        let body = rigid(&mut world, &shape, 0.3, at(0.0, 0.0, 0.01), friction(0.0, 0.0));
         tilt(&mut world, angle, 0.5);
         (world, body)
     };
@@ -219,7 +219,7 @@ fn two_flat_fingers_lift_a_box_with_rounded_edges_without_slip() {
         let mut world = world();
         flat(&mut world);
         let shape = rounded_box(Vec3::repeat(0.048), share * 0.048);
-        let body = uniform(&mut world, &shape, 0.1, at(0.0, 0.0, 0.024), friction(0.6, 0.5));
+        let body = rigid(&mut world, &shape, 0.1, at(0.0, 0.0, 0.024), friction(0.6, 0.5));
         let finger = cuboid(0.01, 0.02, 0.02);
         let place = |side: f64, squeeze: f64, z: f64| at(side * (0.029 - squeeze), 0.0, z);
         let fingers = [-1.0, 1.0].map(|side| (side, world.add_kinematic(place(side, 0.0, 0.024))));

@@ -1,7 +1,7 @@
 //! Helpers that add rigid bodies and colliders to a world.
 
 use softvt::{
-    geometry::{Mat3, Pose, Quat, Vec3, mass::mass_properties, shape::Shape},
+    geometry::{Pose, Quat, Vec3, mass::mass_properties, shape::Shape},
     physics::{BodyId, ColliderId, PhysicsParams, RigidId, World, contact::Friction, rigid::RigidState},
 };
 
@@ -44,33 +44,8 @@ pub fn floor(world: &mut World, mu: Friction) -> ColliderId {
     world.add_shape("floor", BodyId::World, at(0.0, 0.0, -0.05), &cuboid(40.0, 40.0, 0.1), mu)
 }
 
-/// Mass and inertia of the primitives used here, kg and kg m².
-fn inertia(shape: &Shape, mass: f64) -> Mat3 {
-    let diagonal = match *shape {
-        Shape::Box { half } => {
-            let square = half.component_mul(&half);
-            Vec3::new(square.y + square.z, square.x + square.z, square.x + square.y) / 3.0
-        }
-        Shape::Sphere { radius } => Vec3::repeat(0.4 * radius * radius),
-        Shape::Cylinder { radius, half_height } => {
-            let side = 0.25 * radius * radius + half_height * half_height / 3.0;
-            Vec3::new(side, side, 0.5 * radius * radius)
-        }
-        _ => panic!("no closed form for {shape:?}"),
-    };
-    Mat3::from_diagonal(&(diagonal * mass))
-}
-
-/// Adds a free rigid body with one collider.
-pub fn rigid(world: &mut World, shape: &Shape, mass: f64, pose: Pose, mu: Friction) -> RigidId {
-    let body = RigidState::new(&pose, Vec3::zeros(), mass, inertia(shape, mass)).expect("a real body");
-    let index = world.add_rigid("body", body);
-    world.add_shape("body", index, Pose::identity(), shape, mu);
-    index
-}
-
-/// Adds a free uniform body of any shape.
-pub fn uniform(world: &mut World, shape: &Shape, mass: f64, object_w: Pose, mu: Friction) -> RigidId {
+/// Adds a free uniform rigid body with one collider.
+pub fn rigid(world: &mut World, shape: &Shape, mass: f64, object_w: Pose, mu: Friction) -> RigidId {
     let one = mass_properties(shape, 1.0);
     let density = mass / one.mass;
     let body = RigidState::new(&object_w, one.com, mass, one.inertia * density).expect("a real body");

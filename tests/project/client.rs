@@ -8,7 +8,7 @@ use std::{
 use rmpv::Value;
 use tungstenite::{Error, HandshakeError, Message, WebSocket, http::StatusCode};
 
-/// A connected client.
+/// A client with a connection to a server.
 pub struct Client(pub WebSocket<TcpStream>);
 
 impl Client {

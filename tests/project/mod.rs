@@ -9,10 +9,6 @@ use std::{
 use serde_json::Value;
 
 pub mod client;
-pub mod fixtures;
-
-/// The module `solids` of the fixtures.
-pub const SOLIDS: (&str, &str) = ("solids.lua", include_str!("../fixtures/solids.lua"));
 
 /// A folder of a test.
 pub struct Project {
@@ -127,6 +123,3 @@ return softvt.suite {{ name = "one", object_type = "deformable", tasks_differ_in
         Project::new(&[("x.lua", &self.text())])
     }
 }
-
-/// A suite that is embedded in the binary.
-pub const SPATIAL_SOFT: &str = "suites/spatial_soft.lua";

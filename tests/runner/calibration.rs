@@ -133,6 +133,7 @@ fn the_place_of_the_shape_and_the_step_of_the_physics_do_not_change_the_limit() 
 }
 
 #[test]
+#[ignore = "slow: 20 s of presses; the other tests calibrate by one step"]
 fn any_step_and_accuracy_end_a_calibration() {
     // Widths are multiples of 0.01 mm, which these are not.
     let project = brick("collapse_strain = 0.05");

@@ -7,7 +7,7 @@ use softvt::{
 };
 
 use super::dataset_recording::{Recording, is_reproduced};
-use crate::support::{Project, SOLIDS, Small, assert_contains, fixtures::PUSHED_CUBE};
+use crate::support::{PUSHED_CUBE, Project, SOLIDS, Small, assert_contains};
 
 /// A policy in Lua that commands the joint positions of actions.
 fn policy_of(actions: &[Action], joints: &[[f64; 7]]) -> String {
@@ -49,7 +49,7 @@ fn an_episode_recorded_in_joint_positions_is_repeated_by_them() {
     let recorded = file.actions(0).expect("actions");
     assert!(recorded.iter().zip(&joints).all(|(action, joints)| action.joints == Some(*joints)));
     assert_eq!(file.record(0).expect("a record").stats.far_commands, 0);
-    assert_eq!(check::folder(&data, check::CheckScope::Whole).expect("a dataset").problems, [""; 0]);
+    assert_eq!(check::folder(&data).expect("a dataset").problems, [""; 0]);
     assert!(is_reproduced(&data));
 }
 

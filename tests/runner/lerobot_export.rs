@@ -1,11 +1,6 @@
-//! Exports for LeRobot: rows are the inputs of a policy, results do not depend on threads, and invalid exports are
-//! reported.
+//! Exports for LeRobot: rows are the inputs of a policy, and results do not depend on threads.
 
-use std::{
-    fs::{self, File},
-    path::Path,
-    sync::OnceLock,
-};
+use std::{fs::File, path::Path, sync::OnceLock};
 
 use parquet::{
     file::reader::{FileReader, SerializedFileReader},
@@ -26,13 +21,13 @@ use softvt::{
 use crate::{
     dataset_recording::Recording,
     serve::{Access, Server},
-    support::{Project, SOLIDS, assert_contains, client::get, files},
+    support::{Project, SOLIDS, client::get, files},
 };
 
 pub(crate) const V21: ExportFormat = ExportFormat::LeRobot(LeRobotVersion::V21);
 const V30: ExportFormat = ExportFormat::LeRobot(LeRobotVersion::V30);
 
-/// Two demonstrations of each task with joint torques in the folder `data`, and one without images in `plain`.
+/// Two demonstrations of each task with joint torques in the folder `data`.
 pub(crate) fn recorded() -> &'static Project {
     static RECORDED: OnceLock<Project> = OnceLock::new();
     RECORDED.get_or_init(|| {
@@ -44,8 +39,6 @@ pub(crate) fn recorded() -> &'static Project {
                 options.streams = [OptionalStream::named("joint-torques").expect("a stream")].into()
             })
             .record();
-        let plain = Recording::new(project.run("x.lua").tasks(&[0]), 1, "plain");
-        plain.with(|options| options.has_images = false).record();
         project
     })
 }
@@ -261,49 +254,5 @@ fn both_versions_have_the_same_rows() {
         let held = labels.iter().copied().fold(0.0, f32::max);
         // The hand closes by 0.05 per step to 0.6, in less than half of the demonstration: the median is 0.6.
         assert!(if code == "force" { held > 1.0 } else { (held - 0.6).abs() < 1e-6 }, "{code}: {labels:?}");
-    }
-}
-
-#[test]
-fn invalid_exports_are_refused_and_leave_nothing() {
-    let project = Project::new(&[]);
-    for (path, bytes) in files(&recorded().path("data")) {
-        project.write(&format!("data/{path}"), &bytes);
-    }
-    project.write("full/mine", b"mine");
-    let hdf5 = project.path("data/hdf5/one_task0_demo.hdf5");
-    let whole = fs::read(&hdf5).expect("read");
-    let manifest = project.text("data/manifest.jsonl");
-    for format in [V21, ExportFormat::Rlds] {
-        let refusal = |config: &ExportConfig| project.message(export::export(config, || false, |_, _| ()));
-        let config = |data: &str, out: &str| ExportConfig {
-            data: project.path(data),
-            ..config(&project, format, out)
-        };
-        let task = |word: &str| ExportConfig { tasks: vec![word.to_owned()], ..config("data", "x") };
-        let plain = ExportConfig { data: recorded().path("plain"), ..config("", "x") };
-        for (config, output) in [
-            (config("data", "full"), "full: it holds mine; nothing was written"),
-            (config("data", "full/mine"), "full/mine: it is not a folder"),
-            (task("7"), "no task matches \"7\""),
-            (task("dance"), "no task matches \"dance\""),
-            (config("full", "x"), "full: dataset.json: it is missing; expected the folder"),
-            (config("nowhere", "x"), "nowhere: dataset.json: it is missing"),
-            (plain, "record them in the HDF5 files"),
-        ] {
-            let message = refusal(&config);
-            assert_contains(&message, output);
-        }
-        fs::write(&hdf5, &whole[..whole.len() / 2]).expect("written");
-        let message = refusal(&config("data", "x"));
-        assert!(message.contains("one_task0_demo.hdf5") && message.contains("cut short"), "{message}");
-        // One step fewer than the manifest says.
-        fs::write(&hdf5, &whole).expect("written");
-        let steps = format!("\"num_samples\":{}", project.lines("data/manifest.jsonl")[0]["num_samples"]);
-        project.write("data/manifest.jsonl", manifest.replacen(&steps, "\"num_samples\":3", 1).as_bytes());
-        assert_contains(refusal(&config("data", "x")), "expected the shape [3, 7], got [");
-        project.write("data/manifest.jsonl", manifest.as_bytes());
-        assert!(!project.path("x").exists() && !project.path("x.part").exists());
-        assert_eq!(files(&project.path("full")).len(), 1);
     }
 }

@@ -1,7 +1,6 @@
 //! Tests of runs by the library: how episodes are judged, what policies and experts do, datasets, reports and servers,
 //! with typed results. `tests/messages.rs` has the messages for invalid input.
 
-mod articulated_objects;
 mod benchmark_validity;
 mod calibration;
 mod conditions;
@@ -13,8 +12,7 @@ mod experiments;
 mod expert_failure;
 mod external_scorer;
 mod goals;
-mod grip_codes;
-mod grip_force;
+mod grasps;
 mod joint_control;
 mod judged_runs;
 mod judging;
@@ -28,10 +26,5 @@ mod reports;
 mod rlds_export;
 mod serve;
 mod served_runs;
-mod shut_hand;
-mod stacking;
 mod support;
-mod tactile_forces;
-mod tilted_objects;
-mod turned_grasp;
 mod varied_suites;

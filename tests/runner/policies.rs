@@ -1,17 +1,17 @@
-//! Policies in Lua, recorded actions and the tactile servo.
+//! Policies in Lua and the tactile servo.
 
-use softvt::{
-    evaluation::{stage::TaskStage, verdict::Outcome},
-    policy::builtin::NoopPolicy,
-    report::{comparison_table, styled_text::TerminalFormat},
-    runner::PolicyConfig,
-    runs::record::EpisodeRecord,
-};
+use softvt::{evaluation::stage::TaskStage, policy::builtin::NoopPolicy, runner::PolicyConfig};
 
-use crate::support::{
-    Run, Small, assert_contains,
-    fixtures::{WANDERS, policy_project},
-};
+use crate::support::{Project, Small, assert_contains};
+
+const WANDERS: &str = include_str!("../data/wanders.lua");
+
+/// Twelve control steps of a cube on a floor.
+fn policy_project(policy: &str) -> Project {
+    let project = Small { task: "budget_steps = 12", ..Small::default() }.project();
+    project.write("p.lua", policy.as_bytes());
+    project
+}
 
 #[test]
 fn a_policy_in_rust_has_no_name_of_a_built_in_one() {
@@ -75,104 +75,6 @@ end }
     assert_eq!((&exact, &one), (&off, &two));
     assert!(one != exact && one != seeded);
     assert!(policy.is_reproduced("one", "0/2"));
-}
-
-#[test]
-fn a_failing_policy_ends_the_run_and_keeps_finished_episodes() {
-    let project = policy_project(
-        "local episode\nreturn softvt.policy { name = 'p', reset = function(t) episode = t.episode end, act = function(obs)\n\
-         if episode == 1 then error 'lost' end\n\
-         return { position = obs.position, axis_angle = obs.axis_angle, closure = 0 } end }",
-    );
-    assert_contains(
-        project.run("x.lua").policy("p.lua").episodes(2).threads(1).out("run").error(),
-        "p.lua:3: lost",
-    );
-    assert_eq!(project.lines("run/episodes.jsonl").len(), 1);
-}
-
-#[test]
-fn nan_actions_fail_only_their_episode() {
-    let project = policy_project(
-        "local episode\nreturn softvt.policy { name = 'p', reset = function(t) episode = t.episode end, act = function(obs)\n\
-         return { position = obs.position, axis_angle = obs.axis_angle, closure = episode == 0 and 0/0 or 0 } end }",
-    );
-    let records = project.run("x.lua").policy("p.lua").episodes(2).threads(1).out("run").records();
-    let Outcome::Error { message } = &records[0].outcome else { panic!("{:?}", records[0]) };
-    assert_contains(message, "not finite");
-    assert_eq!(records[1].outcome, Outcome::Budget);
-    assert!(!records[1].header.privileged, "it sees observations alone");
-    assert!(project.lines("run/episodes.jsonl")[1]["privileged"].is_null());
-    assert_eq!(project.json("run/summary.json")["privileged"], false);
-    assert!(project.json("run/softvtbench/summary.json")["privileged"].is_null());
-}
-
-#[test]
-fn a_policy_that_declares_access_to_limits_is_marked_in_its_results() {
-    let act = "act = function(obs) return { position = obs.position, axis_angle = obs.axis_angle, closure = 0 } end }";
-    let knows = "local tau = softvt.calibration('cube').tau\n";
-    let project = policy_project(&format!("{knows}return softvt.policy {{ name = 'knows', {act}"));
-    project.run("x.lua").policy("p.lua").out("run").error();
-    assert!(!project.path("run").exists());
-    let text = format!("{knows}return softvt.policy {{ name = 'knows', privileged = true, {act}");
-    project.write("p.lua", text.as_bytes());
-    let record = project.run("x.lua").policy("p.lua").out("run").record();
-    assert!(record.header.privileged);
-    for file in ["run.json", "summary.json", "softvtbench/summary.json"] {
-        assert_eq!(project.json(&format!("run/{file}"))["privileged"], true, "{file}");
-    }
-    project.run("x.lua").policy("run").out("again").finish();
-    let compared = project.compare("run", "again").expect("comparable");
-    assert_eq!(compared.first, "knows (privileged)");
-    assert!(
-        comparison_table::table(&compared, TerminalFormat::PLAIN.with_details())
-            .contains("knows (privileged)")
-    );
-}
-
-#[test]
-fn recorded_actions_must_fit_the_run() {
-    let project = policy_project(WANDERS);
-    let first = project.run("x.lua").policy("p.lua").episodes(2).out("run").records();
-    let again = project.run("x.lua").policy("run").episodes(2).out("again").records();
-    let has_same_end = |(a, b): (&EpisodeRecord, &EpisodeRecord)| a.stats.state_hash == b.stats.state_hash;
-    assert!(first.iter().zip(&again).all(has_same_end), "the same motions");
-    let info = project.json("again/run.json");
-    let replayed = project.relative(info["replayed"]["run"].as_str().expect("a folder"));
-    assert_eq!((info["policy"].as_str(), replayed.as_str()), (Some("replay"), "run"));
-    assert!(info["replayed"]["sha256"].as_str().is_some_and(|hash| hash.len() == 64));
-    // Repeating the actions of a privileged policy is privileged too.
-    project.run("x.lua").out("seen").finish();
-    project.run("x.lua").policy("seen").out("echo").finish();
-    assert_eq!(project.json("echo/run.json")["replayed"]["policy"], "expert");
-    for of in [
-        &project.json("echo/run.json"),
-        &project.json("echo/summary.json"),
-        &project.lines("echo/episodes.jsonl")[0],
-    ] {
-        assert_eq!(of["privileged"], true);
-    }
-    assert_eq!(info["privileged"], false);
-    let run = |episodes: u32| project.run("x.lua").policy("run").episodes(episodes).out("no");
-    let refused = |run: Run, output: &str| {
-        assert_contains(run.error(), output);
-        assert!(!project.path("no").exists());
-    };
-    refused(run(2).seed(1), "policy run: its seed is 0, that of this run 1");
-    refused(run(2).twin(), "no run of suite one (rigid twin); available: one");
-    refused(run(4), "it lacks 2 of the 4 requested episodes (first: task 0 episode 2)");
-    let actions = project.path("run/actions/task_000/episode_00001.npy");
-    let whole = std::fs::read(&actions).expect("actions");
-    let mut changed = whole.clone();
-    *changed.last_mut().expect("a byte") ^= 1;
-    std::fs::write(&actions, changed).expect("written");
-    refused(run(2), "episode_00001.npy: its SHA-256 differs");
-    std::fs::write(&actions, whole).expect("written");
-    std::fs::remove_file(project.path("run/actions/task_000/episode_00001.npy")).expect("removed");
-    refused(run(2), "it lacks 1 of the 2 requested episodes (first: task 0 episode 1)");
-    let other = project.text("x.lua").replace("name = \"one\", object", "name = \"two\", object");
-    project.write("x.lua", other.as_bytes());
-    refused(run(1), "no run of suite two; available: one");
 }
 
 /// An expert that grasps the cube from above, closing fully without tactile feedback, and lifts it.

@@ -268,7 +268,7 @@ fn a_run_ends_with_what_its_server_did() {
         (reply(Message::binary(vec![0xDD, 0xFF, 0xFF, 0xFF, 0xFF])), "msgpack"),
         (reply(Message::binary(vec![0x91; 5000])), "msgpack"),
         (reply(Message::binary(Vec::new())), "msgpack"),
-        (huge, "more than 64 MiB"),
+        (huge, "more than 8 MiB"),
         (greets_by_7, "sent a number first"),
         (web, "not a websocket server"),
     ] {
@@ -347,6 +347,8 @@ fn a_dying_server_loses_no_finished_episode() {
     assert_contains(&message, "1 of 3 episodes are in run");
     run(&broken, &address).episodes(3).resume().finish();
     assert_eq!(broken.lines("run/episodes.jsonl")[1]["attempts"], 2, "the server ended the first one");
+    let told = "run: 1 episode took more than one attempt (most: task 0 episode 1, 2): the policy or the user broke off the others";
+    assert_eq!(broken.report(&["run"]).warnings, [told]);
     let counted = broken.text("run/episodes.jsonl");
     let without_attempts = |project: &Project| {
         let mut lines = project.lines("run/episodes.jsonl");

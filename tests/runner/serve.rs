@@ -26,7 +26,7 @@ use crate::support::{
     client::{Client, array, get, map, reset, stream, text},
 };
 
-/// How clients are served.
+/// Rules for the clients of a server.
 #[derive(Clone)]
 pub struct Access {
     pub split: EpisodeSplit,

@@ -14,18 +14,17 @@ use softvt::{
     parallel::lock,
     policy::profile::GripCode,
     report::{
-        comparison::{self, RunComparison},
-        condition_table::ConditionTable,
         page,
-        run_summary::{summarize_runs, warnings},
+        run_summary::{caveats, summarize_runs},
         tables::{all_tables, formats::markdown},
     },
     runner::{
         BuiltinPolicy, ConfiguredScript, Observer, PolicyConfig, PolicyOptions, RunConfig, RunError,
-        RunErrorCause, Runner, SuiteChecker, SuiteResult, TraceDetail, conditions,
+        RunErrorCause, SuiteChecker, SuiteResult, TraceDetail, conditions,
         episode_selector::EpisodeSelector,
         experiment::{self, ExperimentOutput},
         replay::{self, SecretFile},
+        run_suites,
     },
     runs::{
         record::EpisodeRecord,
@@ -38,7 +37,14 @@ use softvt::{
 #[path = "../project/mod.rs"]
 mod project;
 
-pub use project::{Project, SOLIDS, SPATIAL_SOFT, Small, client, files, fixtures};
+pub use project::{Project, Small, client, files};
+
+/// The module `solids` of the fixtures.
+pub const SOLIDS: (&str, &str) = ("solids.lua", include_str!("../fixtures/solids.lua"));
+/// A suite that is embedded in the binary.
+pub const SPATIAL_SOFT: &str = "suites/spatial_soft.lua";
+pub const PUSHED_CUBE: &str = include_str!("../fixtures/pushed.lua");
+pub const MISPLACED_CUBE: &str = include_str!("../fixtures/misplaced.lua");
 
 /// Checks that a message has a part.
 #[track_caller]
@@ -126,11 +132,6 @@ impl Project {
         stored_run::load(&self.path(folder)).map_err(|error| self.relative(error))
     }
 
-    /// Compares the runs of two folders.
-    pub fn compare(&self, first: &str, second: &str) -> Result<RunComparison, String> {
-        comparison::compare(&self.stored(first)?, &self.stored(second)?).map_err(|error| self.relative(error))
-    }
-
     /// Merges the runs of shards into `out`.
     pub fn merge(&self, out: &str, shards: &[&str]) -> Result<(), String> {
         let shards: Vec<PathBuf> = shards.iter().map(|shard| self.path(shard)).collect();
@@ -142,7 +143,7 @@ impl Project {
         let stored =
             runs.iter().flat_map(|run| self.stored(run).unwrap_or_else(|message| panic!("{message}")));
         let summaries = summarize_runs(stored.collect());
-        let warnings = warnings(&summaries).into_iter().map(|warning| self.relative(warning)).collect();
+        let warnings = caveats(&summaries).into_iter().map(|warning| self.relative(warning)).collect();
         let markdown: Vec<String> = all_tables(&summaries).iter().map(markdown).collect();
         let html = page::page(&summaries, &page::Thumbnails::new(), &self.path("page"));
         Report { html: self.relative(html), markdown: self.relative(markdown.join("\n")), warnings }
@@ -175,7 +176,7 @@ impl Project {
 pub struct Report {
     pub html: String,
     pub markdown: String,
-    /// What is wrong with the runs.
+    /// Problems of the runs.
     pub warnings: Vec<String>,
 }
 
@@ -310,7 +311,7 @@ impl Run<'_> {
     }
 
     fn results(&self) -> Result<Vec<SuiteResult>, RunError> {
-        Runner::new(&self.load()?).run(|_| ())
+        run_suites(&self.load()?, |_| ())
     }
 
     /// Runs it. It must succeed.
@@ -376,15 +377,6 @@ impl Run<'_> {
     pub fn check_conditions(self) -> Result<(), String> {
         let checked = || conditions::check(&self.load()?).map(drop);
         checked().map_err(|error: RunError| self.project.relative(error))
-    }
-
-    /// Runs the conditions of the script into the output folder.
-    pub fn conditions(self) -> Result<Vec<ConditionTable>, String> {
-        let compared = || -> Result<Vec<ConditionTable>, RunError> {
-            let run = self.load()?;
-            conditions::run(&run, run.config.out.as_deref().expect("a folder"), |_| Ok(()))
-        };
-        compared().map_err(|error| self.project.relative(error))
     }
 
     /// Runs the experiment of the script. Returns its rows and its text, or the error. Without an output folder its

@@ -1,10 +1,7 @@
 //! Suites whose objects vary from episode to episode: records, names, reproducibility, and what is refused.
 
 use softvt::{
-    runner::{Runner, TraceDetail},
-    runs::record::EpisodeRecord,
-    scene::ObjectVariation,
-    script::STANDARD_VARIATION,
+    runner::TraceDetail, runs::record::EpisodeRecord, scene::ObjectVariation, script::STANDARD_VARIATION,
 };
 
 use crate::support::{Project, Small};
@@ -13,7 +10,7 @@ fn project() -> Project {
     Small::default().project()
 }
 
-/// What was drawn for the cube.
+/// Numbers drawn for the cube.
 fn drawn(episode: &EpisodeRecord) -> &ObjectVariation {
     &episode.header.variation.as_ref().expect("it varies").objects["cube"]
 }
@@ -36,16 +33,12 @@ fn records_have_the_drawn_numbers_and_the_suite_a_name_of_its_own() {
 }
 
 #[test]
-fn a_runner_varies_its_suites_makes_their_twins_and_traces_its_episodes() {
+fn varied_suites_are_traced_and_twins_have_names_of_their_own() {
     let project = Small { task: "budget_steps = 3", ..Small::default() }.project();
-    let loaded = project.run("x.lua").policy("noop").load().expect("a suite");
-    let runner = Runner::new(&loaded).episodes(1).trace(TraceDetail::State);
-    let varied = runner.clone().vary(STANDARD_VARIATION).expect("it varies").out(project.path("varied"));
-    let results = varied.run(|_| ()).expect("it runs");
-    assert!(results[0].records[0].header.variation.is_some());
+    let run = || project.run("x.lua").policy("noop").trace(TraceDetail::State);
+    assert!(run().vary(STANDARD_VARIATION).out("varied").record().header.variation.is_some());
     assert_eq!(project.lines("varied/trace/task_000/episode_00000.jsonl").len(), 3);
-    let twin = runner.rigid_twin().out(project.path("twin")).run(|_| ()).expect("it runs");
-    let header = &twin[0].records[0].header;
+    let header = run().twin().out("twin").record().header;
     assert_eq!((header.id.suite.as_str(), header.soft), ("one_rigid_twin", false));
 }
 
@@ -66,19 +59,6 @@ fn a_variation_in_a_file_replaces_the_standard_one() {
     project.write("small.lua", ranges.as_bytes());
     let episode = project.run("x.lua").vary("small.lua").record();
     assert_eq!((drawn(&episode).scale, drawn(&episode).youngs_factor), (0.5, 2.0));
-}
-
-#[test]
-fn conditions_may_name_a_built_in_policy() {
-    let project = project();
-    let plan = b"return softvt.conditions { name = 'trial', suites = { require 'x' },
-        conditions = { { name = 'other', policy = 'noop' } } }";
-    project.write("trial.lua", plan);
-    let tables = project.run("trial.lua").out("run").conditions().expect("valid");
-    let policy = |folder: &str| project.lines(&format!("run/{folder}/episodes.jsonl"))[0]["policy"].clone();
-    assert_eq!((policy("reference"), policy("other")), ("expert".into(), "noop".into()));
-    assert_eq!(tables[0].rows[1].policy.as_deref(), Some("noop"));
-    assert_eq!(project.json("run/conditions.json")["suites"][0]["rows"][1]["policy"], "noop");
 }
 
 #[test]

@@ -14,7 +14,7 @@ use crate::{bodies::GRAVITY, support::quintic};
 /// Physics steps per second.
 pub const RATES: [f64; 4] = [60.0, 120.0, 240.0, 480.0];
 
-/// Commands per second.
+/// Rate of commands, Hz.
 const CONTROL_RATE: f64 = 20.0;
 
 /// Joint angles of the arm at the start, rad: the hand points down.

@@ -6,13 +6,12 @@ use softvt::{
     physics::{
         ArticulationId, LinkId, RigidId, World,
         joints::{JointKind, JointTree, Link},
-        rigid::RigidState,
     },
 };
 
 use crate::{
     rigid::{MU, drift},
-    solids::{GRAVITY, cuboid, floor, friction, run, tilted, world},
+    solids::{GRAVITY, cuboid, floor, friction, rigid, run, tilted, world},
 };
 
 /// Mass of the jointed part, kg.
@@ -170,11 +169,7 @@ fn bowl() -> Shape {
 }
 
 fn add(world: &mut World, shape: &Shape, at: Pose) -> RigidId {
-    let m = mass_properties(shape, 1500.0);
-    let body = RigidState::new(&at, m.com, m.mass, m.inertia).expect("a real body");
-    let index = world.add_rigid("vessel", body);
-    world.add_shape("vessel", index, Pose::identity(), shape, friction(MU.0, MU.1));
-    index
+    rigid(world, shape, mass_properties(shape, 1500.0).mass, at, friction(MU.0, MU.1))
 }
 
 /// Drift over 5 s of a bowl on a ramekin on a floor, after a second of settling.

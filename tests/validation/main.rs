@@ -3,6 +3,7 @@
 //! Every module holds experiments and the tests that assert their results; `examples/validation/` prints the same
 //! experiments as tables.
 
+mod beam;
 #[path = "../bodies/mod.rs"]
 mod bodies;
 mod camera;

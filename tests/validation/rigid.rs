@@ -9,7 +9,7 @@ use softvt::{
 
 use crate::solids::{
     GRAVITY, at, cuboid, floor, friction, gravity, rigid, rounded_box, rounded_can, run, tilt, tilted,
-    turned, uniform, world,
+    turned, world,
 };
 
 /// Friction of what stands or rolls on a floor.
@@ -140,7 +140,7 @@ impl Standing {
     fn tips(&self, angle: f64) -> bool {
         let mut world = world();
         floor(&mut world, friction(5.0, 5.0));
-        let body = uniform(&mut world, &self.shape, 0.3, self.pose, friction(0.0, 0.0));
+        let body = rigid(&mut world, &self.shape, 0.3, self.pose, friction(0.0, 0.0));
         tilt(&mut world, angle, 1.5);
         world.rigid(body).state.pose_w.rotation.angle_to(&self.pose.rotation) > 0.05
     }
@@ -186,7 +186,7 @@ fn stack_of(shape: &Shape) -> [f64; 2] {
     let mut world = world();
     floor(&mut world, friction(MU.0, MU.1));
     (0..5).for_each(|i| {
-        uniform(&mut world, shape, 0.3, pose(i), friction(MU.0, MU.1));
+        rigid(&mut world, shape, 0.3, pose(i), friction(MU.0, MU.1));
     });
     run(&mut world, 1.0);
     drift(&mut world, 10.0)
@@ -254,7 +254,7 @@ pub fn largest_gains() -> Vec<(&'static str, f64)> {
         floor(&mut world, friction(MU.0, MU.1));
         let shape = rounded_box(Vec3::new(0.05, 0.06, 0.07), 0.012);
         let pose = turned(at(0.0, 0.0, 0.3), Vec3::new(0.4, 0.3, 0.2));
-        let body = uniform(&mut world, &shape, 0.3, pose, friction(MU.0, MU.1));
+        let body = rigid(&mut world, &shape, 0.3, pose, friction(MU.0, MU.1));
         let state = &mut world.rigid_mut(body).state;
         (state.w, state.v) = (Vec3::new(4.0, 3.0, 1.0), Vec3::x() * 0.5);
         world

@@ -204,15 +204,20 @@ impl Scene {
 
     /// One step towards the pads' place on the time line, with the hand at `hand` (identity: where it closes).
     pub fn step(&mut self, hand: &Pose) -> Result<Seen, StepFailure> {
+        self.advance(hand)?;
+        Ok(self.seen(hand))
+    }
+
+    /// The same without measurements.
+    pub fn advance(&mut self, hand: &Pose) -> Result<(), StepFailure> {
         let t = self.world.time() + self.options.dt;
         for (frame, _, side) in self.pads {
             self.world.move_kinematic(frame, pad_pose(&self.options, side, t, hand));
         }
-        self.world.step()?;
-        Ok(self.seen(hand))
+        self.world.step()
     }
 
-    fn seen(&self, hand: &Pose) -> Seen {
+    pub fn seen(&self, hand: &Pose) -> Seen {
         let soft = &self.world.soft_bodies()[0];
         let centre = soft.state.centre();
         let pivot = Vec3::z() * (0.5 * self.options.body.width());

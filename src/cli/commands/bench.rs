@@ -1,4 +1,4 @@
-//! `softvt bench`: the rates of this machine beside the published ones.
+//! `softvt bench`: the rates of this machine next to the published ones.
 
 use std::path::PathBuf;
 
@@ -6,7 +6,7 @@ use clap::{Args, value_parser};
 
 use crate::{
     error::CliError,
-    output::{OutputFormat, check_output_file, eprint_notice, print},
+    output::{OutputFormat, check_output_file, print},
 };
 use softvt_common::files::replace;
 use softvt_runner::{
@@ -30,9 +30,6 @@ pub(crate) struct BenchArgs {
 }
 
 /// Measures and prints the rates.
-///
-/// # Errors
-/// The suite cannot be run, or the file cannot be written.
 pub(super) fn run(args: &BenchArgs) -> Result<(), CliError> {
     for (flag, path, format) in
         [("--growth", &args.growth, OutputFormat::SVG), ("--out", &args.out, OutputFormat::JSON)]
@@ -42,7 +39,7 @@ pub(super) fn run(args: &BenchArgs) -> Result<(), CliError> {
     let published = softvt_script::embedded("assets/rates.json")
         .ok_or_else(|| CliError::input("this build has no assets/rates.json, which names the suite"))?;
     let published: MachineRates = serde_json::from_slice(published)?;
-    let on_stage = |stage: &str| eprint_notice(format!("measuring: {stage}"));
+    let on_stage = |stage: &str| notice!("measuring: {stage}");
     let threads = thread_count(args.threads);
     let (table, file) = match &args.growth {
         Some(_) => {

@@ -5,7 +5,6 @@ use clap::Args;
 use crate::{
     cache::{FOLDER, LIMIT, OFF, folder, is_off},
     error::CliError,
-    output::print,
 };
 use softvt_common::{
     disk_cache::{CacheUsage, clear, usage},
@@ -21,33 +20,26 @@ pub(crate) struct CacheArgs {
 }
 
 /// Prints what the cache contains, or what was removed.
-///
-/// # Errors
-/// The folder cannot be read, or an entry cannot be removed.
 pub(super) fn run(args: &CacheArgs) -> Result<(), CliError> {
     let Some(folder) = folder() else {
         let why = match is_off() {
             true => format!("{OFF} is set"),
             false => format!("there is no home folder; {FOLDER} names another one"),
         };
-        return print(&format!("the cache is off: {why}\n"));
+        return out!("the cache is off: {why}\n");
     };
     let place = folder.display();
-    let of_folder = |error| CliError::input(format!("cannot use the cache folder {place}: {error}"));
+    let of_folder = |error| CliError::input(format_args!("cannot use the cache folder {place}: {error}"));
     if args.clear {
         let CacheUsage { entries, bytes } = clear(&folder).map_err(of_folder)?;
-        return print(&format!(
-            "removed {}, {} MB, from {place}\n",
-            counted(entries, "file"),
-            megabytes(bytes)
-        ));
+        return out!("removed {}, {} MB, from {place}\n", counted(entries, "file"), megabytes(bytes));
     }
     let CacheUsage { entries, bytes } = usage(&folder).map_err(of_folder)?;
-    print(&format!(
+    out!(
         "folder   {place}\nentries  {entries}\nsize     {} MB\nlimit    {} MB\n",
         megabytes(bytes),
         megabytes(LIMIT)
-    ))
+    )
 }
 
 fn megabytes(bytes: u64) -> String {

@@ -7,13 +7,11 @@ use clap::Args;
 use crate::{
     args::{PolicyArgs, ScriptArgs, parse_count},
     error::CliError,
-    output::{eprint_notice, print},
 };
 use softvt_benchmark::{Plan, REFERENCE, Suite};
 use softvt_common::text::{self, counted};
 use softvt_runner::{
-    ConfiguredScript, RunConfig, SuiteChecker, conditions, experiment,
-    suite_selection::check_distinct_out_dirs,
+    ConfiguredScript, RunConfig, SuiteChecker, conditions, experiment, suite_selection::check_folders,
 };
 
 /// Check a script without running it
@@ -31,9 +29,6 @@ pub(crate) struct CheckArgs {
 
 /// Loads a script, builds the scenes of the first episodes of every task and lets their objects settle. Nothing
 /// is run or rendered.
-///
-/// # Errors
-/// The first thing that is not valid.
 pub(super) fn run(args: CheckArgs) -> Result<(), CliError> {
     let config = RunConfig { episodes: args.episodes, ..args.script.config()? };
     let ConfiguredScript { config, script } = args.policy.checked(config.load()?)?;
@@ -41,11 +36,11 @@ pub(super) fn run(args: CheckArgs) -> Result<(), CliError> {
     let run = ConfiguredScript { config: RunConfig { episodes: None, ..config }, script };
     let ConfiguredScript { config, script: loaded } = &run;
     let plan = &loaded.plan;
-    check_distinct_out_dirs(config, plan.suites())?;
+    check_folders(config, plan)?;
     let mut told = BTreeSet::new();
     let mut warn = |warning: String| {
         if told.insert(warning.clone()) {
-            eprint_notice(format!("warning: {warning}"));
+            notice!("warning: {warning}");
         }
     };
     loaded.warnings()?.into_iter().for_each(&mut warn);
@@ -59,27 +54,27 @@ pub(super) fn run(args: CheckArgs) -> Result<(), CliError> {
         Plan::Conditions { conditions, .. } => {
             conditions::check(&run)?;
             let names: Vec<&str> = conditions.iter().map(|condition| condition.name.as_str()).collect();
-            print(&format!("conditions: {REFERENCE}, {}\n", text::escape_control(&names.join(", "))))?;
+            out!("conditions: {REFERENCE}, {}\n", text::escape_control(&names.join(", ")))?;
         }
         Plan::Experiment { name, points, .. } => {
             experiment::check(config)?;
-            print(&format!("experiment {name}: {}, not run by this check\n", counted(*points, "point")))?;
+            out!("experiment {name}: {}, not run by this check\n", counted(*points, "point"))?;
         }
     }
-    print(&format!("{}: OK\n", config.file.display()))
+    out!("{}: OK\n", config.file.display())
 }
 
 fn print_tasks(suite: &Suite) -> Result<(), CliError> {
-    print(&format!(
+    out!(
         "suite {}: {}, {} each\n",
         suite.name,
         counted(suite.tasks.len(), "task"),
         counted(suite.episodes as usize, "episode")
-    ))?;
+    )?;
     for task in &suite.tasks {
         let expert = if task.expert { "" } else { ", no expert" };
         let (id, prompt, goal) = (task.id, text::escape_control(&task.prompt), task.goal.describe());
-        print(&format!("{id:>4} {prompt}: {}{expert}\n", text::escape_control(&goal)))?;
+        out!("{id:>4} {prompt}: {}{expert}\n", text::escape_control(&goal))?;
     }
     Ok(())
 }

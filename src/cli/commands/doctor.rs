@@ -41,22 +41,22 @@ pub(crate) struct DoctorArgs {
 /// (exit code 3) its answers do not agree with the demonstrations.
 pub(super) fn run(args: &DoctorArgs) -> Result<(), CliError> {
     match (&args.dataset, args.policy.is_given()) {
-        (Some(dataset), _) => check_answers(args, dataset),
+        (Some(dataset), _) => compare_answers(args, dataset),
         (None, true) => Err(CliError::input(
             "--policy needs --dataset DIR: a folder of softvt record, with whose demonstrations its answers are compared",
         )),
-        (None, false) => check_installation(),
+        (None, false) => run_golden_episode(),
     }
 }
 
-fn check_answers(args: &DoctorArgs, dataset: &Path) -> Result<(), CliError> {
+fn compare_answers(args: &DoctorArgs, dataset: &Path) -> Result<(), CliError> {
     let observer: Arc<dyn Observer> = Arc::new(Console::default());
     let policy = PolicyConfig::load(&args.policy.options())?;
     let check = check_policy(&policy, &enter_for_dataset(dataset, &*observer)?, args.demos, &observer)?;
     if args.json {
         print_json(&check)?
     } else {
-        print(&check.text())?
+        print(check.text())?
     }
     match check.agrees() {
         true => Ok(()),
@@ -66,29 +66,27 @@ fn check_answers(args: &DoctorArgs, dataset: &Path) -> Result<(), CliError> {
     }
 }
 
-/// Prints versions and runs the golden episode.
-fn check_installation() -> Result<(), CliError> {
-    print(&format!(
+fn run_golden_episode() -> Result<(), CliError> {
+    out!(
         "softvt     {}\nplatform   {} {}, {} threads\nfeatures   {}\nlua        5.4, embedded\n",
         env!("CARGO_PKG_VERSION"),
         std::env::consts::ARCH,
         std::env::consts::OS,
         thread_count(None),
         if cfg!(target_feature = "avx2") { "avx2" } else { "portable (slower; the same results)" },
-    ))?;
+    )?;
     let Some(golden) = GoldenEpisode::published()? else {
         return print("golden     none in this build\n");
     };
     let hash = golden.simulate(Arc::new(Console::default()))?;
     let is_same = hash == golden.state_hash;
     let verdict = if is_same { "matches the published one" } else { "DIFFERS from the published one" };
-    print(&format!("golden     {} task {}: {hash}, {verdict}\n", golden.script, golden.task))?;
-    if is_same { Ok(()) } else { Err(mismatch(&golden)) }
-}
-
-fn mismatch(golden: &GoldenEpisode) -> CliError {
-    let local = ["suites", "scripts", "assets"].into_iter().filter(|folder| Path::new(folder).is_dir());
-    let local: Vec<&str> = local.collect();
+    out!("golden     {} task {}: {hash}, {verdict}\n", golden.script, golden.task)?;
+    if is_same {
+        return Ok(());
+    }
+    let local: Vec<&str> =
+        ["suites", "scripts", "assets"].into_iter().filter(|folder| Path::new(folder).is_dir()).collect();
     let cause = match local.is_empty() {
         true => "this machine or this build computes other results".to_owned(),
         false => format!(
@@ -97,12 +95,10 @@ fn mismatch(golden: &GoldenEpisode) -> CliError {
             local.join(", ")
         ),
     };
-    CliError::new(
-        Exit::Internal,
-        format!(
-            "the golden episode does not end in the published state {}: {cause}; results are not bitwise comparable with \
-         published ones",
-            golden.state_hash
-        ),
-    )
+    let published = &golden.state_hash;
+    let message = format_args!(
+        "the golden episode does not end in the published state {published}: {cause}; results are not bitwise \
+         comparable with published ones"
+    );
+    Err(CliError::new(Exit::Internal, message))
 }

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use clap::{Args, Subcommand};
 
-use crate::{error::CliError, output::print};
+use crate::error::CliError;
 use softvt_common::files;
 use softvt_script::{
     embedded,
@@ -32,7 +32,6 @@ enum InitCommand {
     },
 }
 
-/// A file of the project skeleton.
 struct TemplateFile {
     path: &'static str,
     /// Its source in the embedded library.
@@ -56,7 +55,7 @@ fn write_stubs(dir: &Path) -> Result<(), CliError> {
     write(&dir.join(STUB_FILE), stubs().as_bytes())?;
     let settings = dir.join(".luarc.json");
     if settings.exists() {
-        return print(&format!("kept {}\n", settings.display()));
+        return out!("kept {}\n", settings.display());
     }
     write(&settings, LUARC.as_bytes())
 }
@@ -67,17 +66,16 @@ fn write_skeleton(dir: &Path) -> Result<(), CliError> {
     let files: Vec<(PathBuf, &[u8])> =
         template.iter().filter_map(|file| Some((dir.join(file.path), embedded(file.source)?))).collect();
     if let Some((existing, _)) = files.iter().find(|(path, _)| path.exists()) {
-        let message = format!("{} already exists; rename it, or select another folder", existing.display());
-        return Err(CliError::input(message));
+        bail!("{} already exists; rename it, or select another folder", existing.display());
     }
     files.iter().try_for_each(|(path, text)| write(path, text))?;
     write_stubs(dir)?;
     let suite = dir.join(SUITE.path);
     let suite = suite.strip_prefix(".").unwrap_or(&suite).display();
-    print(&format!("now: softvt check {suite}, softvt {suite}; next: docs/write-a-task.md\n"))
+    out!("now: softvt check {suite}, softvt {suite}; next: docs/write-a-task.md\n")
 }
 
 fn write(path: &Path, bytes: &[u8]) -> Result<(), CliError> {
     files::replace(path, bytes)?;
-    print(&format!("wrote {}\n", path.display()))
+    out!("wrote {}\n", path.display())
 }

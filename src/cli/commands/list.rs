@@ -32,9 +32,6 @@ enum ListKind {
 }
 
 /// Lists what the arguments ask for.
-///
-/// # Errors
-/// A suite in the working folder cannot be loaded; the others are listed.
 pub(super) fn run(args: &ListArgs) -> Result<(), CliError> {
     let Listing { rows, errors } = match args.what {
         ListKind::Suites => script_catalog::suites(),
@@ -47,7 +44,7 @@ pub(super) fn run(args: &ListArgs) -> Result<(), CliError> {
     if args.json {
         print_json(&rows)?
     } else {
-        print(&table(&rows))?
+        print(table(&rows))?
     }
     if errors.is_empty() {
         return Ok(());

@@ -31,10 +31,6 @@ pub(crate) struct RecordArgs {
 }
 
 /// Records the demonstrations that the arguments ask for.
-///
-/// # Errors
-/// The script has no suite, the folder contains something else, an attempt or a file fails, or too
-/// few attempts are good.
 pub(super) fn run(args: RecordArgs) -> Result<(), CliError> {
     let mut policy = args.policy;
     let recording = &args.recording.options(policy.take_export_code());

@@ -7,7 +7,7 @@ use clap::Args;
 use crate::{
     args::load_one_run,
     error::CliError,
-    output::{Console, OutputFormat, Progress, check_output_file, print, report_replays},
+    output::{Console, OutputFormat, Progress, check_output_file, report_replays},
 };
 use softvt_common::cancel;
 use softvt_dataset::layout::is_dataset;
@@ -16,7 +16,7 @@ use softvt_runner::{
     Observer,
     episode_selector::EpisodeSelector,
     read_secret,
-    replay::{EpisodeReplay, SecretFile, check_complete, replay_episode, simulate_demos},
+    replay::{EpisodeReplay, SecretFile, replay_episode, simulate_demos},
     stored_folder::{enter_for_dataset, enter_for_run},
     thread_count,
 };
@@ -51,12 +51,11 @@ pub(super) fn run(args: &ReplayArgs) -> Result<(), CliError> {
     let secret = secret.transpose()?;
     if is_dataset(dir) {
         if secret.is_some() {
-            return Err(CliError::input("--seed-file: demonstrations have no secret seed; leave it out"));
+            bail!("--seed-file: demonstrations have no secret seed; leave it out");
         }
         if args.mcap.is_some() {
-            return Err(CliError::input("--mcap: demonstrations have no MCAP files; leave it out"));
+            bail!("--mcap: demonstrations have no MCAP files; leave it out");
         }
-        check_complete(dir)?;
         let demos = [args.episode.find_demo(&enter_for_dataset(dir, &*observer)?)?];
         return report_replays(&demos, &simulate_demos(&demos, &observer)?);
     }
@@ -75,7 +74,7 @@ pub(super) fn run(args: &ReplayArgs) -> Result<(), CliError> {
         write_mcap(&mut states, &simulated, path, threads, cancel::requested, || progress.step())?;
     }
     match difference {
-        None => print(&format!("{index}: byte-identical, final state {}\n", simulated.stats.state_hash)),
-        Some(difference) => Err(CliError::other_result(format!("{index} differs: {difference}"))),
+        None => out!("{index}: byte-identical, final state {}\n", simulated.stats.state_hash),
+        Some(difference) => Err(CliError::other_result(format_args!("{index} differs: {difference}"))),
     }
 }

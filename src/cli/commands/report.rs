@@ -13,7 +13,7 @@ use softvt_report::{
     comparison, comparison_table,
     policy_ranking::PolicyRanking,
     report_files,
-    run_summary::{summarize_runs, warnings},
+    run_summary::{caveats, summarize_runs},
     terminal,
 };
 use softvt_runner::{Observer, thumbnails};
@@ -59,22 +59,16 @@ pub(crate) struct MergeArgs {
 }
 
 /// Writes `report.html`, `report.md`, `report.tex` and `report.jsonl`.
-///
-/// # Errors
-/// A folder without a run, or a file that cannot be written.
 pub(super) fn report(args: &ReportArgs) -> Result<(), CliError> {
     if let Some(found) = report_files::foreign_file(&args.out) {
-        return Err(CliError::input(format!(
-            "--out: {} exists and is not of an earlier report; give another folder",
-            found.display()
-        )));
+        bail!("--out: {} exists and is not of an earlier report; give another folder", found.display());
     }
     let mut stored = Vec::new();
     for dir in &args.runs {
         stored.extend(stored_run::load(dir)?);
     }
     let summaries = summarize_runs(stored);
-    for warning in warnings(&summaries) {
+    for warning in caveats(&summaries) {
         eprint_notice(warning);
     }
     let observer: Arc<dyn Observer> = Arc::new(Console::default());
@@ -88,18 +82,13 @@ pub(super) fn report(args: &ReportArgs) -> Result<(), CliError> {
 
 /// Prints the paired differences of the runs in the second folder from those in the first, or the
 /// ranking of more folders.
-///
-/// # Errors
-/// A folder without a run or with two of one suite, or no common episode.
 pub(super) fn compare(args: &CompareArgs) -> Result<(), CliError> {
     for (at, run) in args.runs.iter().enumerate() {
         let folder = |path: &PathBuf| path.canonicalize().ok();
         if let Some(same) =
             args.runs[..at].iter().find(|other| folder(other).is_some_and(|f| folder(run) == Some(f)))
         {
-            let message =
-                format!("{} and {} are the same folder; give different runs", same.display(), run.display());
-            return Err(CliError::input(message));
+            bail!("{} and {} are the same folder; give different runs", same.display(), run.display());
         }
     }
     let folders = args.runs.iter().map(|dir| stored_run::load(dir)).collect::<Result<Vec<_>, _>>()?;
@@ -112,13 +101,10 @@ pub(super) fn compare(args: &CompareArgs) -> Result<(), CliError> {
         };
     }
     let ranking = PolicyRanking::new(&folders)?;
-    if args.json { print_json(&ranking) } else { print(&ranking.table()) }
+    if args.json { print_json(&ranking) } else { print(ranking.table()) }
 }
 
 /// Merges shards into a new folder and prints the tables of the merged runs.
-///
-/// # Errors
-/// The shards do not belong to one run, or a file cannot be read or written.
 pub(super) fn merge(args: &MergeArgs) -> Result<(), CliError> {
     let summaries = shard_merge::merge(&args.out, &args.shards)?;
     let format = terminal_format(args.details);

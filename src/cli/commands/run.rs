@@ -7,7 +7,7 @@ use clap::Parser;
 use crate::{
     args::{PolicyArgs, RunFlags, ScriptArgs},
     error::{CliError, Exit},
-    output::{eprint_notice, print, print_json, print_table, terminal_format},
+    output::{print, print_json, print_table, terminal_format},
 };
 use softvt_benchmark::Plan;
 use softvt_policy::profile::Profile;
@@ -18,12 +18,12 @@ use softvt_report::{
     terminal,
 };
 use softvt_runner::{
-    ConfiguredScript, Runner, SuiteResult, conditions,
+    ConfiguredScript, RunConfig, SuiteResult, conditions,
     experiment::{self, ExperimentOutput},
-    plan_noun,
-    suite_selection::{check_distinct_out_dirs, check_parent_folder, next_run_dir},
+    plan_noun, run_suites,
+    suite_selection::{check_folders, next_run_dir},
 };
-use softvt_runs::{requirement::Requirement, stored_run, summary::SuiteSummary};
+use softvt_runs::{stored_run, summary::SuiteSummary};
 use softvt_script::ExperimentRow;
 
 /// A safety-aware visuo-tactile manipulation benchmark for soft objects, on an ordinary CPU
@@ -48,26 +48,24 @@ pub(crate) struct RunArgs {
 }
 
 /// Runs the plan of a script: suites, conditions or an experiment.
-///
-/// # Errors
-/// The script, a flag, the folder or the policy is not valid, or an episode fails.
 pub(super) fn run(args: RunArgs) -> Result<(), CliError> {
     let (json, requirements) = (args.flags.json, args.flags.requirements.clone());
     let details = args.flags.details;
     let format = terminal_format(details);
-    let run = args.flags.apply(args.script.config()?).load()?.with_policy(&args.policy.options())?;
+    let config = RunConfig { is_numbered: true, ..args.flags.apply(args.script.config()?) };
+    let run = config.load()?.with_policy(&args.policy.options())?;
     let ConfiguredScript { config, script: loaded } = &run;
     if !(requirements.is_empty() || matches!(loaded.plan, Plan::Suite(_) | Plan::Suites { .. })) {
         return Err(config.no_effect("requirements", plan_noun(&loaded.plan)).into());
     }
     if let Some(code) = config.policy.gripper {
         let profile = config.policy.profile().map(|Profile { name, .. }| format!(" (profile {name})"));
-        eprint_notice(format!("gripper: {}{}", code.name(), profile.unwrap_or_default()));
+        notice!("gripper: {}{}", code.name(), profile.unwrap_or_default());
     }
     match &loaded.plan {
         plan @ (Plan::Suite(_) | Plan::Suites { .. }) => {
             let is_list = matches!(plan, Plan::Suites { .. });
-            let results = Runner::new(&run).numbered().run(|_| ())?;
+            let results = run_suites(&run, |_| ())?;
             let failed = results.iter().find_map(SuiteResult::refusal_of_all_actions);
             let folders: Vec<PathBuf> = results.iter().filter_map(|result| result.folder.clone()).collect();
             let summaries: Vec<SuiteSummary> = results.into_iter().map(|result| result.summary).collect();
@@ -82,23 +80,29 @@ pub(super) fn run(args: RunArgs) -> Result<(), CliError> {
                     Ok(())
                 }
             }?;
-            match failed {
-                Some(message) => Err(CliError::new(Exit::Policy, message)),
-                None => check_requirements(&requirements, &summaries),
+            if let Some(message) = failed {
+                return Err(CliError::new(Exit::Policy, message));
+            }
+            let of_suite =
+                |summary| requirements.iter().filter_map(move |requirement| requirement.unmet(summary));
+            match summaries.iter().flat_map(of_suite).collect::<Vec<String>>() {
+                unmet if unmet.is_empty() => Ok(()),
+                unmet => Err(CliError::new(Exit::RequirementNotMet, unmet.join("\n"))),
             }
         }
         Plan::Conditions { name, suites, .. } => {
-            check_distinct_out_dirs(config, suites)?;
-            check_parent_folder(config)?;
+            check_folders(config, &loaded.plan)?;
             let out = config.out.clone().unwrap_or_else(|| next_run_dir(config, name));
             run_conditions(&run, suites.len(), &out, (!json).then_some(format))
         }
         Plan::Experiment { columns, .. } => experiment::run(&run, |output| -> Result<(), CliError> {
             match output {
-                ExperimentOutput::Rows(rows) if json => print_json_lines(rows),
+                ExperimentOutput::Rows(rows) if json => {
+                    rows.iter().try_for_each(|row| out!("{}\n", serde_json::json!(row)))
+                }
                 ExperimentOutput::Rows(rows) => print_rows(rows, columns, details),
                 ExperimentOutput::Text(_) if json => Ok(()),
-                ExperimentOutput::Text(text) => print(&format!("{text}\n")),
+                ExperimentOutput::Text(text) => out!("{text}\n"),
             }
         }),
     }
@@ -111,11 +115,11 @@ fn print_next_commands(folders: &[PathBuf]) {
     let mut runs = folders.iter().filter_map(|folder| stored_run::load(folder).ok()).flatten().peekable();
     let Some(commands) = runs.peek().map(next_commands) else { return };
     match folders {
-        [_] => eprint_notice(format!("next: {}", commands[0])),
-        _ => eprint_notice(format!("next: softvt report {}", parent.display())),
+        [_] => notice!("next: {}", commands[0]),
+        _ => notice!("next: softvt report {}", parent.display()),
     }
     if let Some(view) = runs.find_map(|run| next_commands(&run).into_iter().nth(1)) {
-        eprint_notice(format!("next: {view}"));
+        notice!("next: {view}");
     }
 }
 
@@ -139,39 +143,18 @@ fn run_conditions(
     if format.is_none() {
         print_json(&conditions::document(run, &tables))?;
     }
-    eprint_notice(out.join(conditions::FILE).display());
+    notice!("{}", out.join(conditions::FILE).display());
     Ok(())
-}
-
-/// Checks all requirements on all suites.
-///
-/// # Errors
-/// The requirements that are not met.
-fn check_requirements(requirements: &[Requirement], summaries: &[SuiteSummary]) -> Result<(), CliError> {
-    let of_suite = |summary| requirements.iter().filter_map(move |requirement| requirement.unmet(summary));
-    let unmet: Vec<String> = summaries.iter().flat_map(of_suite).collect();
-    if unmet.is_empty() { Ok(()) } else { Err(CliError::new(Exit::RequirementNotMet, unmet.join("\n"))) }
-}
-
-/// Prints rows as JSON lines.
-///
-/// # Errors
-/// As [`print`].
-fn print_json_lines(rows: &[ExperimentRow]) -> Result<(), CliError> {
-    rows.iter().try_for_each(|row| print(&format!("{}\n", serde_json::json!(row))))
 }
 
 /// Largest number of rows that are printed without `--details`.
 const SHORT_TABLE: usize = 40;
 
 /// Prints rows as a table, unless it is long and the details are not asked for.
-///
-/// # Errors
-/// As [`print`].
 fn print_rows(rows: &[ExperimentRow], columns: &[String], details: bool) -> Result<(), CliError> {
     if rows.len() > SHORT_TABLE && !details {
-        eprint_notice(format!("{} rows: --details prints them, --out DIR writes them", rows.len()));
+        notice!("{} rows: --details prints them, --out DIR writes them", rows.len());
         return Ok(());
     }
-    print(&experiment::table(rows, columns))
+    print(experiment::table(rows, columns))
 }

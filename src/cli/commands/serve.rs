@@ -17,7 +17,7 @@ use crate::{
     QUIET_INTERRUPT,
     args::{ProfileArgs, ScriptArgs, parse_count, parse_folder},
     error::{CliError, Exit},
-    output::{eprint_notice, print, print_table, terminal_format},
+    output::{eprint_notice, print_table, terminal_format},
 };
 use softvt_common::{cancel, episode_id::EpisodeSplit};
 use softvt_report::terminal;
@@ -78,10 +78,6 @@ pub(crate) struct ServeArgs {
 static STDIN_CLOSED: AtomicBool = AtomicBool::new(false);
 
 /// Serves the suites of a script until the process is interrupted, or its standard input closes.
-///
-/// # Errors
-/// The script has no suite, its first episode cannot be rendered, the address is not available, or `--out` holds
-/// something else; in the end, the interrupt.
 pub(super) fn run(args: ServeArgs) -> Result<(), CliError> {
     match serve(args) {
         Err(end) if end.exit == Exit::Interrupted && STDIN_CLOSED.load(Ordering::Relaxed) => {
@@ -130,18 +126,17 @@ fn serve(args: ServeArgs) -> Result<(), CliError> {
     let (summaries, outcome) = server.serve(&run, || -> Result<(), CliError> {
         // Without results to keep, the end of a server is no event.
         QUIET_INTERRUPT.store(run.config.out.is_none(), Ordering::Relaxed);
-        print(&format!("ws://{address}\n"))
+        out!("ws://{address}\n")
     })?;
     let format = terminal_format(false);
     summaries.iter().try_for_each(|summary| print_table(&terminal::table(summary, format)))?;
     Ok(outcome?)
 }
 
-/// The token that clients have to send.
 fn token(args: &ServeArgs) -> Result<Option<String>, CliError> {
     let from_environment = || std::env::var(TOKEN).ok().filter(|token| !token.is_empty());
     let Some(token) = args.token.clone().or_else(from_environment) else { return Ok(None) };
-    let valid = parse_token(&token).map_err(|error| CliError::input(format!("{TOKEN}: {error}")))?;
+    let valid = parse_token(&token).map_err(|error| CliError::input(format_args!("{TOKEN}: {error}")))?;
     Ok(Some(valid))
 }
 

@@ -7,22 +7,19 @@ use clap::Args;
 use crate::{
     args::{ComparedPolicyArgs, ScriptArgs, parse_folder, select_one_task},
     error::CliError,
-    output::{Progress, print},
+    output::Progress,
 };
 use softvt_benchmark::Plan;
 use softvt_common::{
     cancel,
+    episode_id::EpisodeSplit,
     files::{self, FileError},
     parallel,
 };
 use softvt_report::{
     episode_page::{self, DeformationTimes, PolicyPart},
     mcap::write_mcap,
-    video::{
-        VideoCaption,
-        side_by_side::{self, PolicyEpisode},
-        worst_state, write_decisive_frame, write_stills, write_video,
-    },
+    video::{self, FilmedEpisode, worst_state, write_stills},
 };
 use softvt_rollout::{FinishedEpisode, StateRecording};
 use softvt_runner::{
@@ -63,9 +60,6 @@ pub(crate) struct ViewArgs {
 /// and last state of every camera and tactile sensor and of the target from nearby, and a page that shows them. Under
 /// several policies, video and picture show them side by side, and the stills of each are in a folder of its name.
 /// The files of an earlier view in the folder are removed.
-///
-/// # Errors
-/// The script is not a suite, the task or episode fails, or a file cannot be rendered or written.
 pub(super) fn run(args: ViewArgs) -> Result<(), CliError> {
     let ConfiguredScript { config, script: loaded } = args.script.clone().config()?.load()?;
     // Set after loading: a script of another kind is refused for what it is, not for the default task.
@@ -79,16 +73,13 @@ pub(super) fn run(args: ViewArgs) -> Result<(), CliError> {
     let configs: Vec<RunConfig> =
         policies.into_iter().map(|policy| config.clone().with_policy(policy)).collect();
     let prepare = |config| {
-        let run = SuiteRun::new(config, &loaded, suite, EpisodeList::listed(vec![job]), args.out.clone())?;
-        run.rendered().prepare()
+        let jobs = EpisodeList::listed(vec![job]);
+        SuiteRun::new(config, &loaded, suite, jobs, EpisodeSplit::Validation)?.rendered().prepare()
     };
     let runs: Vec<PreparedRun> = configs.iter().map(prepare).collect::<Result<_, _>>()?;
-    RunFolder::check_vacant(&args.out).map_err(|error| CliError::input(format!("--out: {error}")))?;
+    RunFolder::check_vacant(&args.out).map_err(|error| CliError::input(format_args!("--out: {error}")))?;
     if let Some(found) = foreign_file(&args.out)? {
-        return Err(CliError::input(format!(
-            "--out: {} exists and is not of an earlier view; give another folder",
-            found.display()
-        )));
+        bail!("--out: {} exists and is not of an earlier view; give another folder", found.display());
     }
     files::create_writable_folder(&args.out)?;
     config.observer.work("simulating the episode");
@@ -109,15 +100,10 @@ pub(super) fn run(args: ViewArgs) -> Result<(), CliError> {
         return Err(CliError::interrupted(""));
     }
     remove_earlier(&args.out)?;
-    match seen.len() {
-        1 => seen.pop().map_or(Ok(()), |episode| show_one(&args, &config, episode)),
-        _ => show_several(&args, &config, seen),
-    }
+    show(&args, &config, seen)
 }
 
-/// Name of the loop for web pages.
 const ANIMATION: &str = "animation.png";
-/// Name of the MCAP file.
 const MCAP: &str = "episode.mcap";
 /// Moments of the stills, with which the names of their files begin.
 const MOMENTS: [&str; 3] = ["start", "worst", "end"];
@@ -177,19 +163,16 @@ fn is_policy_folder(path: &Path) -> Result<bool, FileError> {
     Ok(has_stills(&entries(path)?))
 }
 
-/// True for a still of a moment.
 fn is_still(path: &Path, moment: &str) -> bool {
     let name = path.file_name().and_then(|name| name.to_str()).unwrap_or_default();
     name.ends_with(".png") && name.strip_prefix(moment).is_some_and(|rest| rest.starts_with('_'))
 }
 
-/// Paths of what is in a folder.
 fn entries(dir: &Path) -> Result<Vec<PathBuf>, FileError> {
     let listed = std::fs::read_dir(dir).and_then(|entries| entries.map(|entry| Ok(entry?.path())).collect());
     listed.map_err(FileError::io("read", dir))
 }
 
-/// An episode with its states.
 struct SeenEpisode {
     record: EpisodeRecord,
     states: StateRecording,
@@ -215,68 +198,44 @@ fn write_parts(
     Ok(())
 }
 
-/// Draws an episode under one policy.
-fn show_one(args: &ViewArgs, config: &RunConfig, mut seen: SeenEpisode) -> Result<(), CliError> {
-    let dir = &args.out;
-    write_parts(args, config, &mut seen, dir)?;
-    let SeenEpisode { record, mut states } = seen;
-    let (caption, times) = (VideoCaption::new(&record), DeformationTimes::new(&states));
-    write_decisive_frame(&mut states, &caption, &dir.join(episode_page::FRAME))?;
-    let video = dir.join(episode_page::VIDEO);
-    let progress = Progress::new(states.frames.len(), "rendering the video");
-    let threads = config.thread_count();
-    write_video(&mut states, &caption, &video, threads, cancel::requested, || progress.step())?;
-    drop(progress);
-    if args.animation {
-        animate(args, config, &mut [PolicyEpisode::new(&record, states)])?;
-    }
-    episode_page::write(&record, &times, dir)?;
-    print_seen(args.animation, dir, &[episode_page::sentence(&record, &times)])
-}
-
-/// Draws an episode under several policies, side by side.
-fn show_several(args: &ViewArgs, config: &RunConfig, seen: Vec<SeenEpisode>) -> Result<(), CliError> {
-    let dir = &args.out;
+/// Draws an episode under one policy, or under several, side by side.
+fn show(args: &ViewArgs, config: &RunConfig, mut seen: Vec<SeenEpisode>) -> Result<(), CliError> {
+    let (dir, is_single) = (&args.out, seen.len() == 1);
     let (mut parts, mut episodes) = (Vec::<PolicyPart>::new(), Vec::new());
-    for mut seen in seen {
-        let mut folder = path_component(&seen.record.header.policy);
+    for seen in &mut seen {
+        let mut folder = if is_single { String::new() } else { path_component(&seen.record.header.policy) };
         if parts.iter().any(|part| part.folder == folder) {
             folder = format!("{folder}_{}", parts.len() + 1);
         }
         files::create_folder(&dir.join(&folder))?;
-        write_parts(args, config, &mut seen, &dir.join(&folder))?;
+        write_parts(args, config, seen, &dir.join(&folder))?;
         let SeenEpisode { record, states } = seen;
-        let times = DeformationTimes::new(&states);
-        episodes.push(PolicyEpisode::new(&record, states));
-        parts.push(PolicyPart { record, times, folder });
+        parts.push(PolicyPart { record, times: DeformationTimes::new(states), folder });
+        episodes.push(FilmedEpisode { record, states });
     }
-    side_by_side::write_decisive_frame(&mut episodes, &dir.join(episode_page::FRAME))?;
-    let progress = Progress::new(side_by_side::state_count(&episodes), "rendering the video");
-    let (video, threads) = (dir.join(episode_page::VIDEO), config.thread_count());
-    side_by_side::write_video(&mut episodes, &video, threads, cancel::requested, || progress.step())?;
+    video::write_decisive_frame(&mut episodes, &dir.join(episode_page::FRAME))?;
+    let frames = episodes.iter().map(|episode| episode.states.frames.len()).max().unwrap_or(0);
+    let progress = Progress::new(frames, "rendering the video");
+    let (path, threads) = (dir.join(episode_page::VIDEO), config.thread_count());
+    video::write_video(&mut episodes, &path, threads, cancel::requested, || progress.step())?;
     drop(progress);
     if args.animation {
-        animate(args, config, &mut episodes)?;
+        config.observer.work("rendering the animation");
+        video::write_animation(&mut episodes, &dir.join(ANIMATION), threads, cancel::requested)?;
+        config.observer.end();
     }
-    episode_page::write_several(&parts, dir)?;
-    print_seen(args.animation, dir, &parts.iter().map(PolicyPart::sentence).collect::<Vec<_>>())
-}
-
-/// Writes the episodes as a loop for web pages.
-fn animate(args: &ViewArgs, config: &RunConfig, episodes: &mut [PolicyEpisode]) -> Result<(), CliError> {
-    config.observer.work("rendering the animation");
-    let path = args.out.join(ANIMATION);
-    side_by_side::write_animation(episodes, &path, config.thread_count(), cancel::requested)?;
-    config.observer.end();
-    Ok(())
-}
-
-/// Prints what was seen, and where.
-fn print_seen(has_animation: bool, dir: &Path, sentences: &[String]) -> Result<(), CliError> {
+    let sentences: Vec<String> = match &parts[..] {
+        [PolicyPart { record, times, .. }] => {
+            episode_page::write(record, times, dir)?;
+            vec![episode_page::sentence(record, times)]
+        }
+        _ => {
+            episode_page::write_several(&parts, dir)?;
+            parts.iter().map(PolicyPart::sentence).collect()
+        }
+    };
     let files = [episode_page::PAGE, ANIMATION, episode_page::VIDEO].map(|name| dir.join(name));
-    let written = files
-        .iter()
-        .filter(|file| has_animation || !file.ends_with(ANIMATION))
-        .map(|file| format!("{}\n", file.display()));
-    print(&format!("{}\n{}", sentences.join("\n"), written.collect::<String>()))
+    let written = files.iter().filter(|file| args.animation || !file.ends_with(ANIMATION));
+    let written: String = written.map(|file| format!("{}\n", file.display())).collect();
+    out!("{}\n{written}", sentences.join("\n"))
 }

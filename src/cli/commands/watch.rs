@@ -11,7 +11,7 @@ use crate::{
     QUIET_INTERRUPT,
     args::{PolicyArgs, ScriptArgs, load_one_run, parse_count, parse_folder, select_one_task},
     error::CliError,
-    output::{Console, print},
+    output::Console,
 };
 use softvt_common::{episode_id::EpisodeSplit, text::hex};
 use softvt_runner::{
@@ -50,9 +50,6 @@ pub(crate) struct WatchArgs {
 }
 
 /// Serves the page until the process is interrupted.
-///
-/// # Errors
-/// The script or the run is not valid, the task does not exist, or the port is in use; in the end, the interrupt.
 pub(super) fn run(args: WatchArgs) -> Result<(), CliError> {
     let file = &args.script.file;
     if !file.exists() && file.extension().is_none_or(|extension| extension != "lua") {
@@ -64,15 +61,14 @@ pub(super) fn run(args: WatchArgs) -> Result<(), CliError> {
         false => script_program(&args)?,
     };
     let watch = Watch::listen(args.port, token()?).map_err(|error| {
-        CliError::input(format!("--port {}: {error}; choose another, or 0 for any free port", args.port))
+        CliError::input(format_args!("--port {}: {error}; choose another, or 0 for any free port", args.port))
     })?;
-    print(&format!("{}\n", watch.url()))?;
+    out!("{}\n", watch.url())?;
     QUIET_INTERRUPT.store(true, Ordering::Relaxed);
     watch.run(program);
     Err(CliError::interrupted(""))
 }
 
-/// The program of a script.
 fn script_program(args: &WatchArgs) -> Result<Program, CliError> {
     let run = args.script.clone().config()?.load()?.with_policy(&args.policy.options())?;
     let ConfiguredScript { config, script } = run;
@@ -122,9 +118,9 @@ fn recorded_program(args: &WatchArgs) -> Result<Program, CliError> {
     Ok(Program { config, selection, split: stored.manifest.split })
 }
 
-/// A random token of 128 bits.
 fn token() -> Result<String, CliError> {
     let mut bytes = [0; 16];
-    getrandom::fill(&mut bytes).map_err(|error| CliError::input(format!("no random numbers: {error}")))?;
+    getrandom::fill(&mut bytes)
+        .map_err(|error| CliError::input(format_args!("no random numbers: {error}")))?;
     Ok(hex(&bytes))
 }

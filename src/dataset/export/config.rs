@@ -10,7 +10,6 @@ use softvt_policy::{
     profile::{GripCode, POSE_NAMES},
 };
 
-/// Format of an exported dataset.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ExportFormat {
     /// Parquet tables for LeRobot.
@@ -40,7 +39,6 @@ pub enum ArmControl {
     #[default]
     #[value(help = None::<&str>)]
     Pose,
-    /// Joint positions.
     #[value(help = None::<&str>)]
     Joints,
 }
@@ -54,7 +52,6 @@ impl ArmControl {
         }
     }
 
-    /// Names of the numbers of a motion.
     pub(super) fn motion_names(self) -> &'static [&'static str] {
         match self {
             Self::Pose => &POSE_NAMES,
@@ -63,14 +60,12 @@ impl ArmControl {
     }
 }
 
-/// Options of an export.
 #[derive(Clone, Debug)]
 pub struct ExportConfig {
     /// Folder of a finished recording.
     pub data: PathBuf,
     /// Output folder; must not exist or be empty.
     pub out: PathBuf,
-    /// Format of the dataset.
     pub format: ExportFormat,
     /// Motion of the actions, and state of the arm.
     pub control: ArmControl,
@@ -82,13 +77,10 @@ pub struct ExportConfig {
     pub threads: usize,
 }
 
-/// Size of an exported dataset.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ExportSummary {
-    /// Demonstrations.
     pub episodes: usize,
     /// Rows of all episodes.
     pub frames: usize,
-    /// Distinct prompts.
     pub tasks: usize,
 }

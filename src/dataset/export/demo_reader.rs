@@ -28,7 +28,6 @@ const JOINTS: &str = "obs/arm_joint_pos";
 /// Numbers of the markers in one state of one finger.
 const FINGER_COORDINATES: usize = 2 * MARKER_COUNT;
 
-/// Reads a demonstration.
 pub(super) struct DemoReader {
     file: TaskFile,
     demo: usize,
@@ -36,17 +35,12 @@ pub(super) struct DemoReader {
 }
 
 impl DemoReader {
-    /// # Errors
-    /// The file cannot be opened.
     pub(super) fn open(demo: &SelectedDemo) -> Result<Self, DatasetError> {
         let file = TaskFile::open(&demo.path)?;
         Ok(Self { file, demo: demo.entry.demo_id, steps: demo.entry.num_samples })
     }
 
     /// Reads the numbers of a feature, row by row.
-    ///
-    /// # Errors
-    /// A stream is missing, of unexpected shape or not finite.
     pub(super) fn numbers(&self, job: &ExportJob<'_>, feature: &Feature) -> Result<Vec<f32>, DatasetError> {
         let control = job.config.control;
         match (feature.content, feature.name) {
@@ -66,9 +60,6 @@ impl DemoReader {
     }
 
     /// Passes the images of every step to `each`: both cameras, and the mosaic of the last images of both fingers.
-    ///
-    /// # Errors
-    /// As [`Self::numbers`]; the error of `each`; or the export was cancelled.
     pub(super) fn for_each_step(
         &self,
         job: &ExportJob<'_>,
@@ -106,7 +97,7 @@ impl DemoReader {
         IMAGES
             .into_iter()
             .zip(hashes)
-            .try_for_each(|(name, hash)| self.file.check_digest(self.demo, name, || hex(&hash.finalize())))
+            .try_for_each(|(name, hash)| self.file.verify_digest(self.demo, name, || hex(&hash.finalize())))
     }
 
     fn check_shape(&self, name: &str, row_shape: &[usize]) -> Result<(), DatasetError> {
@@ -114,7 +105,7 @@ impl DemoReader {
         if found == expected {
             return Ok(());
         }
-        Err(self.file.error(self.demo, name, format!("expected the shape {expected:?}, got {found:?}")))
+        Err(self.file.error(self.demo, name, format_args!("expected the shape {expected:?}, got {found:?}")))
     }
 
     fn floats(&self, name: &str, row_shape: &[usize]) -> Result<Vec<f32>, DatasetError> {

@@ -9,11 +9,10 @@ use super::{
 use crate::streams::{JOINT_ACTIONS, actions_in};
 use softvt_benchmark::CONTROL_HZ;
 
-/// What `README.md` says of a format.
+/// Parts of `README.md` that a format decides.
 pub(super) struct FormatText<'a, Key> {
     /// Metadata for Hugging Face's hub: lines of YAML.
     pub hub: &'a str,
-    /// Name and version.
     pub name: &'a str,
     /// Key of a feature; `None` for one that the format does not have.
     pub key: Key,

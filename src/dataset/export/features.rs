@@ -8,10 +8,8 @@ use softvt_sensing::tactile::MARKER_COUNT;
 
 /// Shape of the markers of a row: initial, previous and present positions; both fingers; x and y.
 pub(super) const MARKER_SHAPE: [usize; 3] = [3, 2 * MARKER_COUNT, 2];
-/// Numbers of the markers in a row.
 pub(super) const MARKER_ROW: usize = MARKER_SHAPE[0] * MARKER_SHAPE[1] * MARKER_SHAPE[2];
 
-/// A feature.
 #[derive(Clone, Debug)]
 pub(super) struct Feature {
     /// Name in the data of openpi and SoftVTBench, which is its key in LeRobot v2.1.
@@ -22,27 +20,21 @@ pub(super) struct Feature {
     pub shape: Vec<usize>,
     /// Names of its components, or of its axes.
     pub components: Value,
-    /// Meaning.
     pub about: String,
 }
 
-/// Kind of the content of a feature.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Content {
     /// An image: 0 and 1 of the cameras, 2 for the mosaic of the fingers.
     Image(usize),
-    /// A vector of observed numbers.
     Vector,
-    /// Positions of the markers.
     Markers,
-    /// The action.
     Action,
 }
 
 /// Meaning of the joint positions that are observed in addition to the state.
 const JOINT_STATE: &str = "measured positions of the seven joints of the arm (rad)";
 
-/// All features in order.
 pub(super) fn all(job: &ExportJob<'_>) -> Vec<Feature> {
     let control = job.config.control;
     let [third_person, wrist, mosaic] = job.selection.feature_sizes();

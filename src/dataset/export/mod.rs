@@ -39,25 +39,10 @@ pub fn export(
     is_cancelled: impl Fn() -> bool + Sync,
     mut on_episode: impl FnMut(usize, &str),
 ) -> Result<ExportSummary, DatasetError> {
-    // Not generic from here on, so that it is compiled, and optimised, in this crate.
-    export_with(config, &is_cancelled, &mut on_episode)
-}
-
-fn export_with(
-    config: &ExportConfig,
-    is_cancelled: &(dyn Fn() -> bool + Sync),
-    on_episode: &mut dyn FnMut(usize, &str),
-) -> Result<ExportSummary, DatasetError> {
-    staged_dir::check_empty(&config.out)?;
-    let selection = selection::select(config)?;
+    // Not generic below, so that it is compiled, and optimised, in this crate.
     let staged = StagedDir::create(&config.out)?;
-    let job = ExportJob { config, selection: &selection, dir: staged.path(), is_cancelled };
-    let written = match config.format {
-        ExportFormat::LeRobot(version) => lerobot::write(&job, version, on_episode),
-        ExportFormat::Rlds => rlds::write(&job, on_episode),
-    };
-    match written {
-        Ok(()) => staged.commit().map(|()| selection.summary()),
+    match write(config, staged.path(), &is_cancelled, &mut on_episode) {
+        Ok(summary) => staged.commit().map(|()| summary),
         Err(error) => {
             staged.abort();
             Err(error)
@@ -65,7 +50,21 @@ fn export_with(
     }
 }
 
-/// What to export, the empty folder to write, and whether to stop.
+fn write(
+    config: &ExportConfig,
+    dir: &Path,
+    is_cancelled: &(dyn Fn() -> bool + Sync),
+    on_episode: &mut dyn FnMut(usize, &str),
+) -> Result<ExportSummary, DatasetError> {
+    let selection = selection::select(config)?;
+    let job = ExportJob { config, selection: &selection, dir, is_cancelled };
+    match config.format {
+        ExportFormat::LeRobot(version) => lerobot::write(&job, version, on_episode)?,
+        ExportFormat::Rlds => rlds::write(&job, on_episode)?,
+    }
+    Ok(selection.summary())
+}
+
 #[derive(Clone, Copy)]
 struct ExportJob<'a> {
     config: &'a ExportConfig,

@@ -22,13 +22,10 @@ pub(super) struct ImageSize {
     pub width: usize,
 }
 
-/// Size of the mosaic.
 const MOSAIC_SIZE: ImageSize = ImageSize { height: 224, width: 224 };
 
-/// A demonstration that becomes an episode.
 #[derive(Clone, Debug)]
 pub(super) struct SelectedDemo {
-    /// Its HDF5 file.
     pub path: PathBuf,
     pub entry: ManifestEntry,
     /// Index of its instruction in [`Selection::prompts`].
@@ -37,7 +34,6 @@ pub(super) struct SelectedDemo {
     pub first_frame: usize,
 }
 
-/// Demonstrations to export.
 #[derive(Clone, Debug)]
 pub(super) struct Selection {
     /// In the order of the manifest.
@@ -48,7 +44,6 @@ pub(super) struct Selection {
     pub image_sizes: [ImageSize; 2],
     /// Code of the last number of an action.
     pub gripper: GripCode,
-    /// Further streams of the recording.
     pub streams: BTreeSet<OptionalStream>,
     /// True if each demonstration is safe, and does not only reach its goal.
     pub is_safe: bool,
@@ -61,7 +56,6 @@ impl Selection {
         [third_person, wrist, MOSAIC_SIZE]
     }
 
-    /// Numbers of episodes, rows and prompts.
     pub(super) fn summary(&self) -> ExportSummary {
         let frames = self.demos.iter().map(|demo| demo.entry.num_samples).sum();
         ExportSummary { episodes: self.demos.len(), frames, tasks: self.prompts.len() }
@@ -69,31 +63,16 @@ impl Selection {
 }
 
 /// Selects the demonstrations of the tasks that the configuration names.
-///
-/// # Errors
-/// The folder is not a finished recording, has no images, or a word matches no task.
 pub(super) fn select(config: &ExportConfig) -> Result<Selection, DatasetError> {
     let root = &config.data;
-    let card_path = root.join(DATASET);
-    if !card_path.is_file() {
-        let what = "it is missing; expected the folder of a finished recording";
-        return Err(DatasetError::content(root, DATASET, what));
-    }
-    let card = DatasetCard::read(root)?;
+    let (entries, card) = (manifest::read(root)?, DatasetCard::read(root)?);
     if !card.has_images {
         let what =
             "images are stored only as videos, whose compression is lossy; record them in the HDF5 files";
-        return Err(DatasetError::content(&card_path, "pictures", what));
+        return Err(DatasetError::content(&root.join(DATASET), "pictures", what));
     }
-    let entries = manifest::read(root)?;
-    card.check_entries(root, &entries)?;
+    card.one_recording(root, &entries)?;
     let entries = matching_entries(root, entries, &config.tasks)?;
-    let mut seen = BTreeSet::new();
-    if let Some(twice) = entries.iter().find(|entry| !seen.insert((&entry.hdf5_path, entry.demo_id))) {
-        let what = format!("{} demo_{} is listed twice", twice.hdf5_path, twice.demo_id);
-        return Err(DatasetError::content(&root.join(MANIFEST), "lines", what));
-    }
-    drop(seen);
     let (mut demos, mut prompts, mut first_frame) = (Vec::new(), Vec::<String>::new(), 0);
     for entry in entries {
         let known = prompts.iter().position(|prompt| *prompt == entry.language);
@@ -139,7 +118,6 @@ fn matching_entries(
     Ok(entries.into_iter().filter(is_selected).collect())
 }
 
-/// Image sizes of both cameras.
 fn image_sizes(demo: &SelectedDemo) -> Result<[ImageSize; 2], DatasetError> {
     let file = TaskFile::open(&demo.path)?;
     let size = |name: &str| -> Result<ImageSize, DatasetError> {

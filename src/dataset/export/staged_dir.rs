@@ -23,16 +23,12 @@ pub(super) struct StagedDir {
 
 impl StagedDir {
     /// Creates a temporary folder next to `out`. The remains of an interrupted export are removed first.
-    ///
-    /// # Errors
-    /// `out` is not empty, the temporary path is taken or in use by another export, or the system refuses.
     pub(super) fn create(out: &Path) -> Result<Self, DatasetError> {
-        check_empty(out)?;
+        require_empty(out)?;
         // A link to an empty folder cannot be replaced by a folder, but its target can.
         let out = fs::canonicalize(out).unwrap_or_else(|_| out.to_path_buf());
         if out.file_name().is_none() {
-            let what = "it has no name; give a new folder".to_owned();
-            return Err(DatasetError::Output { out: out.display().to_string(), what });
+            return Err(refused(&out, "it has no name"));
         }
         let temp = files::temp_path(&out);
         if fs::symlink_metadata(&temp).is_ok() {
@@ -52,15 +48,10 @@ impl StagedDir {
         Ok(Self { temp, out, created_parents, _marker: marker })
     }
 
-    /// Path of the temporary folder.
     pub(super) fn path(&self) -> &Path {
         &self.temp
     }
 
-    /// Renames the folder to its final path.
-    ///
-    /// # Errors
-    /// The system refuses; the temporary folder is removed.
     pub(super) fn commit(self) -> Result<(), DatasetError> {
         files::rename(&self.temp, &self.out).inspect_err(|_| self.abort())?;
         Ok(files::remove_if_present(&self.out.join(MARKER_FILE))?)
@@ -73,38 +64,35 @@ impl StagedDir {
     }
 }
 
-/// Checks that `out` is missing or an empty folder.
-///
-/// # Errors
-/// The folder has content, or is a file.
-pub(super) fn check_empty(out: &Path) -> Result<(), DatasetError> {
-    let refuse = |what: &str| {
-        let what = format!("{what}; nothing was written; give a new folder");
-        Err(DatasetError::Output { out: out.display().to_string(), what })
-    };
+fn refused(path: &Path, what: &str) -> DatasetError {
+    let what = format!("{what}; nothing was written; give a new folder");
+    DatasetError::Output { out: path.display().to_string(), what }
+}
+
+/// Refuses `out` unless it is missing or an empty folder.
+fn require_empty(out: &Path) -> Result<(), DatasetError> {
     match fs::read_dir(out) {
         Err(error) if error.kind() == std::io::ErrorKind::NotFound => Ok(()),
-        Err(error) if error.kind() == std::io::ErrorKind::NotADirectory => refuse("it is not a folder"),
+        Err(error) if error.kind() == std::io::ErrorKind::NotADirectory => {
+            Err(refused(out, "it is not a folder"))
+        }
         Err(error) => Err(FileError::io("read", out)(error).into()),
         Ok(mut entries) => match entries.next() {
             None => Ok(()),
             Some(Err(error)) => Err(FileError::io("read", out)(error).into()),
-            Some(Ok(entry)) => refuse(&format!("it holds {}", entry.file_name().to_string_lossy())),
+            Some(Ok(entry)) => {
+                Err(refused(out, &format!("it holds {}", entry.file_name().to_string_lossy())))
+            }
         },
     }
 }
 
-/// Removes the remains of an interrupted export.
 fn remove_remains(temp: &Path) -> Result<(), DatasetError> {
-    let in_the_way = |what: &str| {
-        let what = format!("{what}; nothing was written; give another output folder");
-        Err(DatasetError::Output { out: temp.display().to_string(), what })
-    };
     let Ok(marker) = File::open(temp.join(MARKER_FILE)) else {
-        return in_the_way("it is in the way and not left by an interrupted export");
+        return Err(refused(temp, "it is in the way and not left by an interrupted export"));
     };
     if let Err(TryLockError::WouldBlock) = marker.try_lock() {
-        return in_the_way("another export is writing it");
+        return Err(refused(temp, "another export is writing it"));
     }
     Ok(fs::remove_dir_all(temp).map_err(FileError::io("remove", temp))?)
 }
@@ -153,18 +141,5 @@ mod tests {
         let refused = StagedDir::create(&out).err().unwrap().to_string();
         assert!(refused.contains("out.part: it is in the way"), "{refused}");
         assert_eq!(names(&temp), ["mine"]);
-    }
-
-    #[test]
-    fn an_empty_folder_is_used_and_any_other_refused() {
-        let home = tempfile::tempdir().unwrap();
-        let out = home.path().join("out");
-        fs::create_dir(&out).unwrap();
-        StagedDir::create(&out).unwrap().commit().unwrap();
-        fs::write(out.join("mine"), "mine").unwrap();
-        let refused = StagedDir::create(&out).err().unwrap().to_string();
-        assert!(refused.contains("it holds mine; nothing was written"), "{refused}");
-        let file = StagedDir::create(&out.join("mine")).err().unwrap().to_string();
-        assert!(file.contains("it is not a folder"), "{file}");
     }
 }

@@ -1,6 +1,5 @@
 //! HDF5 files in robomimic's layout: `/data/demo_0`, `/data/demo_1`, … with one dataset per stream.
 
-mod limits;
 mod merge;
 mod read;
 mod write;

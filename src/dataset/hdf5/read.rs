@@ -2,12 +2,11 @@
 
 use std::{
     fs::File,
-    io::{Read, Seek, SeekFrom},
     ops::Range,
     path::{Path, PathBuf},
 };
 
-use rust_hdf5::{DatatypeMessage, H5Dataset, H5File, H5Group, Hdf5Error};
+use rust_hdf5::{DatatypeMessage, H5Dataset, H5File, H5Group, Hdf5Error, LinkClass, StorageLayout};
 use serde_json::Value;
 
 use super::{
@@ -16,18 +15,22 @@ use super::{
         stream::DIGEST,
         streams::{self, COMMANDED_ROTATIONS, COMMANDS_JOINTS, JOINT_ACTIONS},
     },
-    limits::{self, ListError},
     write::DemoAttributes,
 };
 use softvt_common::files::FileError;
 use softvt_geometry::Vec3;
 use softvt_policy::{Action, NumberType};
-use softvt_robot::{ik::ArmAngles, panda::ARM_DOFS};
+use softvt_robot::ik::ArmAngles;
 use softvt_runs::record::EpisodeRecord;
+
+/// Largest number of groups and datasets of a demonstration, size of an array in memory, and number of its chunks: a
+/// crafted file of a few kilobytes can state more.
+const MAX_NAMES: usize = 4096;
+const MAX_BYTES: usize = 1 << 31;
+const MAX_CHUNKS: usize = 1 << 20;
 
 /// The HDF5 file of a task, with the demonstrations `/data/demo_0`, `/data/demo_1`, …
 pub struct TaskFile {
-    /// Path of the file.
     pub path: PathBuf,
     /// Indices of the demonstrations, ascending.
     pub demos: Vec<usize>,
@@ -38,14 +41,11 @@ pub struct TaskFile {
 /// Values of a stream as `f64`, in row-major order. The first axis is the step.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FloatArray {
-    /// The values.
     pub values: Vec<f64>,
-    /// Length of each axis.
     pub shape: Vec<usize>,
 }
 
 impl FloatArray {
-    /// Number of values per step.
     pub fn width(&self) -> usize {
         self.shape.iter().skip(1).product()
     }
@@ -63,39 +63,23 @@ pub struct ImageStack {
 }
 
 impl TaskFile {
-    /// Opens a file and lists its demonstrations.
-    ///
     /// # Errors
     /// The file is unreadable, not HDF5, truncated, or has no group `/data/demo_0`.
     pub fn open(path: &Path) -> Result<Self, DatasetError> {
-        let metadata = std::fs::metadata(path).map_err(FileError::io("read", path))?;
-        let not_hdf5 = |what: String| Err(DatasetError::NotHdf5 { path: path.display().to_string(), what });
-        if metadata.is_dir() {
-            return not_hdf5("is a folder, not an HDF5 file".to_owned());
-        }
-        let size = metadata.len();
-        match end_of_file(path) {
-            None => return not_hdf5("is not an HDF5 file: it lacks the HDF5 signature".to_owned()),
-            Some(u64::MAX) => return not_hdf5(format!("is cut short: it has only {size} bytes")),
-            Some(end) if end > size => {
-                return not_hdf5(format!("is cut short: it has {size} of {end} bytes"));
-            }
-            Some(_) => {}
-        }
-        let file = H5File::open(path).map_err(DatasetError::hdf5(path, "/"))?;
-        let root = file.root_group();
-        if let Some(what) = limits::link(&root, "data") {
-            return Err(DatasetError::content(path, "/data", what));
-        }
-        let data = root.group("data").map_err(DatasetError::hdf5(path, "/data"))?;
+        File::open(path).map_err(FileError::io("read", path))?;
+        let file = H5File::open(path).map_err(|error| DatasetError::NotHdf5 {
+            path: path.display().to_string(),
+            what: format!("is not a whole HDF5 file: {error}"),
+        })?;
+        let data = file.root_group().group("data").map_err(DatasetError::hdf5(path, "/data"))?;
         let names = data.group_names().map_err(DatasetError::hdf5(path, "/data"))?;
         let mut demos = Vec::new();
-        for name in names.iter().filter(|name| name.starts_with("demo_")) {
-            match name["demo_".len()..].parse::<usize>() {
-                Ok(number) if *name == format!("demo_{number}") => demos.push(number),
+        for name in &names {
+            match name.strip_prefix("demo_").and_then(|number| number.parse::<usize>().ok()) {
+                Some(number) if *name == format!("demo_{number}") => demos.push(number),
                 _ => {
-                    let what = "expected the names demo_0, demo_1, …, without leading zeros";
-                    return Err(DatasetError::content(path, format!("/data/{name}"), what));
+                    let what = "expected only groups demo_0, demo_1, …, without leading zeros";
+                    return Err(DatasetError::content(path, format_args!("/data/{name}"), what));
                 }
             }
         }
@@ -108,8 +92,8 @@ impl TaskFile {
     }
 
     /// An error about the dataset or group `name` of a demonstration.
-    pub(crate) fn error(&self, demo: usize, name: &str, what: impl Into<String>) -> DatasetError {
-        DatasetError::content(&self.path, format!("/data/demo_{demo}/{name}"), what)
+    pub(crate) fn error(&self, demo: usize, name: &str, what: impl ToString) -> DatasetError {
+        DatasetError::content(&self.path, format_args!("/data/demo_{demo}/{name}"), what)
     }
 
     /// Converts errors of the HDF5 library about the dataset `name` of a demonstration, for `map_err`.
@@ -125,7 +109,7 @@ impl TaskFile {
         let key = "/data, attribute env_args";
         let text = self.data.attr_string("env_args").map_err(DatasetError::hdf5(&self.path, key))?;
         serde_json::from_str(&text)
-            .map_err(|e| DatasetError::content(&self.path, key, format!("not JSON: {e}")))
+            .map_err(|e| DatasetError::content(&self.path, key, format_args!("not JSON: {e}")))
     }
 
     fn group(&self, demo: usize) -> Result<H5Group, DatasetError> {
@@ -134,14 +118,12 @@ impl TaskFile {
             return Err(DatasetError::content(&self.path, "/data", what));
         }
         let name = format!("demo_{demo}");
-        if let Some(what) = limits::link(&self.data, &name) {
-            return Err(DatasetError::content(&self.path, format!("/data/{name}"), what));
+        if let Some(what) = link(&self.data, &name) {
+            return Err(DatasetError::content(&self.path, format_args!("/data/{name}"), what));
         }
         self.data.group(&name).map_err(DatasetError::hdf5(&self.path, format!("/data/{name}")))
     }
 
-    /// Text attribute of a demonstration.
-    ///
     /// # Errors
     /// The attribute is missing or not text.
     pub fn text(&self, demo: usize, attribute: &str) -> Result<String, DatasetError> {
@@ -149,8 +131,6 @@ impl TaskFile {
         self.group(demo)?.attr_string(attribute).map_err(DatasetError::hdf5(&self.path, key))
     }
 
-    /// Episode record of a demonstration.
-    ///
     /// # Errors
     /// The demonstration was not recorded by softvt.
     pub fn record(&self, demo: usize) -> Result<EpisodeRecord, DatasetError> {
@@ -162,10 +142,6 @@ impl TaskFile {
         serde_json::from_str(&text).map_err(|error| DatasetError::content(&self.path, key, error.to_string()))
     }
 
-    /// Number of control steps of a demonstration.
-    ///
-    /// # Errors
-    /// It has no actions.
     pub fn steps(&self, demo: usize) -> Result<usize, DatasetError> {
         Ok(self.dataset(demo, "actions")?.shape().first().copied().unwrap_or(0))
     }
@@ -214,40 +190,56 @@ impl TaskFile {
     }
 
     /// Names of the groups in a group of a demonstration; empty if that is missing.
+    #[cfg(feature = "import")]
     pub(crate) fn groups(&self, demo: usize, path: &str) -> Vec<String> {
         self.subgroup(demo, Some(path)).and_then(|group| group.group_names().ok()).unwrap_or_default()
     }
 
-    /// Opens a dataset of a demonstration.
-    ///
-    /// # Errors
-    /// The dataset is missing, a link, or too large to be read.
+    /// Opens a dataset of a demonstration, which must lie in the file itself and not be too large to be read.
     pub(crate) fn dataset(&self, demo: usize, name: &str) -> Result<H5Dataset, DatasetError> {
         let mut group = self.group(demo)?;
         for (at, _) in name.match_indices('/').chain([(name.len(), "")]) {
             let last = name[..at].rsplit('/').next().unwrap_or(name);
-            if let Some(what) = limits::link(&group, last) {
+            if let Some(what) = link(&group, last) {
                 return Err(self.error(demo, &name[..at], what));
             }
             let Ok(inner) = group.group(last) else { break };
             group = inner;
         }
         let key = format!("data/demo_{demo}/{name}");
-        let failed = self.failed(demo, name);
         let data = self.file.dataset(&key).map_err(|error| {
             // The library's error for a missing name depends on the program that wrote the group.
-            failed(if self.is_listed(demo, name) { error } else { Hdf5Error::NotFound(key.clone()) })
+            let is_listed = self.is_listed(demo, name);
+            self.failed(demo, name)(if is_listed { error } else { Hdf5Error::NotFound(key.clone()) })
         })?;
-        match limits::array_refusal(&data).map_err(failed)? {
-            Some(what) => Err(self.error(demo, name, what)),
-            None => Ok(data),
+        let failed = self.failed(demo, name);
+        if data.storage_layout().map_err(&failed)? == StorageLayout::Virtual
+            || !data.external_files().map_err(&failed)?.is_empty()
+        {
+            return Err(self.error(demo, name, "its numbers lie in other files; expected the data itself"));
+        }
+        let (shape, chunk) = (data.shape(), data.chunk_dims().unwrap_or_default());
+        self.limit_size(demo, name, &shape, data.element_size())?;
+        self.limit_size(demo, name, &chunk, data.element_size())?;
+        let chunks = shape.iter().zip(&chunk).map(|(length, per_chunk)| length.div_ceil((*per_chunk).max(1)));
+        match chunks.fold(1, usize::saturating_mul) {
+            0..=MAX_CHUNKS => Ok(data),
+            count => Err(self.error(
+                demo,
+                name,
+                format_args!("it has {count} chunks; at most {MAX_CHUNKS} are read"),
+            )),
         }
     }
 
-    /// Shape of a dataset of a demonstration.
-    ///
-    /// # Errors
-    /// The dataset is missing.
+    /// Refuses an array above [`MAX_BYTES`] before memory is allocated for it.
+    fn limit_size(&self, demo: usize, name: &str, shape: &[usize], bytes: usize) -> Result<(), DatasetError> {
+        match shape.iter().copied().fold(bytes.max(1), usize::saturating_mul) <= MAX_BYTES {
+            true => Ok(()),
+            false => Err(self.error(demo, name, format_args!("its shape {shape:?} is above 2 GiB"))),
+        }
+    }
+
     pub fn shape(&self, demo: usize, name: &str) -> Result<Vec<usize>, DatasetError> {
         Ok(self.dataset(demo, name)?.shape())
     }
@@ -257,16 +249,31 @@ impl TaskFile {
     /// # Errors
     /// The file is damaged, or its groups are too deep, too many, or links.
     pub fn names(&self, demo: usize) -> Result<Vec<String>, DatasetError> {
-        limits::dataset_names(&self.group(demo)?).map_err(|error| match error {
-            ListError::Refused(refused) => self.error(demo, &refused.name, refused.what),
-            ListError::Hdf5(error) => DatasetError::hdf5(&self.path, format!("/data/demo_{demo}"))(error),
-        })
+        let (mut names, mut visited) = (Vec::new(), 0);
+        let mut open = vec![(String::new(), self.group(demo)?)];
+        while let Some((above, group)) = open.pop() {
+            let failed = self.failed(demo, &above);
+            let (datasets, groups) =
+                (group.dataset_names().map_err(&failed)?, group.group_names().map_err(&failed)?);
+            visited += datasets.len() + groups.len();
+            if visited > MAX_NAMES {
+                let what = format!("the demonstration has more than {MAX_NAMES} groups and datasets");
+                return Err(self.error(demo, "", what));
+            }
+            for name in group.link_names().map_err(&failed)? {
+                if let Some(what) = link(&group, &name) {
+                    return Err(self.error(demo, &format!("{above}{name}"), what));
+                }
+            }
+            names.extend(datasets.iter().map(|name| format!("{above}{name}")));
+            for name in groups.iter().rev() {
+                open.push((format!("{above}{name}/"), group.group(name).map_err(&failed)?));
+            }
+        }
+        Ok(names)
     }
 
     /// Reads a stream of a demonstration with its attributes.
-    ///
-    /// # Errors
-    /// The stream is missing or unreadable.
     pub fn stream(&self, demo: usize, name: &str) -> Result<DataStream, DatasetError> {
         let data = self.dataset(demo, name)?;
         let failed = self.failed(demo, name);
@@ -284,16 +291,13 @@ impl TaskFile {
                 attributes.push((attribute, text));
             }
         }
-        self.check_digest(demo, name, || values.sha256())?;
+        self.verify_digest(demo, name, || values.sha256())?;
         let row_shape = data.shape().get(1..).unwrap_or_default().to_vec();
         Ok(DataStream { name: name.to_owned(), row_shape, values, attributes })
     }
 
     /// Checks that the digest of a stream, if it has one, is this one of its numbers.
-    ///
-    /// # Errors
-    /// The stream was changed after it was recorded.
-    pub(crate) fn check_digest(
+    pub(crate) fn verify_digest(
         &self,
         demo: usize,
         name: &str,
@@ -309,6 +313,10 @@ impl TaskFile {
             )),
             false => Ok(()),
         }
+    }
+
+    pub(crate) fn has_digest(&self, demo: usize, name: &str) -> bool {
+        self.dataset(demo, name).is_ok_and(|data| data.attr(DIGEST).is_ok())
     }
 
     /// Type of the numbers of a dataset; `None` for one that softvt does not write.
@@ -332,25 +340,17 @@ impl TaskFile {
             let what = "expected numbers of type float32 or float64, got integers of 64 bits";
             return Err(self.error(demo, name, what));
         }
-        match limits::size_refusal(&data.shape(), size_of::<f64>()) {
-            Some(what) => Err(self.error(demo, name, what)),
-            None => data.read_numeric_as().map_err(self.failed(demo, name)),
-        }
+        self.limit_size(demo, name, &data.shape(), size_of::<f64>())?;
+        data.read_numeric_as().map_err(self.failed(demo, name))
     }
 
     /// Reads a stream as `f64`.
-    ///
-    /// # Errors
-    /// As [`TaskFile::stream`].
     pub fn array(&self, demo: usize, name: &str) -> Result<FloatArray, DatasetError> {
         let values = self.stream(demo, name)?.values.into_f64();
         Ok(FloatArray { values, shape: self.shape(demo, name)? })
     }
 
     /// As [`Self::array`], of finite values.
-    ///
-    /// # Errors
-    /// As [`TaskFile::stream`], or a value is not finite.
     pub fn finite_array(&self, demo: usize, name: &str) -> Result<FloatArray, DatasetError> {
         let array = self.array(demo, name)?;
         if let Some(at) = array.values.iter().position(|x| !x.is_finite()) {
@@ -362,8 +362,6 @@ impl TaskFile {
         Ok(array)
     }
 
-    /// Reads the images of some steps.
-    ///
     /// # Errors
     /// A step is missing, or the stream does not hold 8-bit RGB images.
     pub fn images(&self, demo: usize, name: &str, steps: Range<usize>) -> Result<ImageStack, DatasetError> {
@@ -392,13 +390,9 @@ impl TaskFile {
         let action = |row: &[f64]| Action::from_array(std::array::from_fn(|i| row[i]));
         let mut actions: Vec<Action> = rows.chunks_exact(shape[1]).map(action).collect();
         if self.has(demo, COMMANDED_ROTATIONS) {
-            let vectors = self.finite_array(demo, COMMANDED_ROTATIONS)?.values;
-            if vectors.len() != 3 * actions.len() {
-                let what = format!("{} numbers for {} actions", vectors.len(), actions.len());
-                return Err(self.error(demo, COMMANDED_ROTATIONS, what));
-            }
-            for (action, vector) in actions.iter_mut().zip(vectors.as_chunks::<3>().0) {
-                action.axis_angle_b = Vec3::from(*vector);
+            let vectors = self.rows::<3>(demo, COMMANDED_ROTATIONS, Some(actions.len()))?;
+            for (action, vector) in actions.iter_mut().zip(vectors) {
+                action.axis_angle_b = Vec3::from(vector);
             }
         }
         if self.has(demo, COMMANDS_JOINTS) {
@@ -427,14 +421,24 @@ impl TaskFile {
             let what = "the recording has no joint positions of its actions: it is of an earlier version; record it again";
             return Err(self.error(demo, JOINT_ACTIONS, what));
         }
-        let FloatArray { values, shape } = self.finite_array(demo, JOINT_ACTIONS)?;
-        match shape[..] {
-            [_, ARM_DOFS] => Ok(values.as_chunks::<ARM_DOFS>().0.to_vec()),
-            _ => {
-                let what = format!("expected the shape (steps, {ARM_DOFS}), got {shape:?}");
-                Err(self.error(demo, JOINT_ACTIONS, what))
-            }
+        self.rows(demo, JOINT_ACTIONS, None)
+    }
+
+    /// Rows of an array of finite numbers of shape (`steps`, N), or (any number of steps, N).
+    pub(crate) fn rows<const N: usize>(
+        &self,
+        demo: usize,
+        name: &str,
+        steps: Option<usize>,
+    ) -> Result<Vec<[f64; N]>, DatasetError> {
+        let shape = self.shape(demo, name)?;
+        let is_expected = |rows: usize| rows > 0 && steps.is_none_or(|steps| steps == rows);
+        if !matches!(shape[..], [rows, width] if width == N && is_expected(rows)) {
+            let first = steps.map_or("steps".to_owned(), |steps| steps.to_string());
+            let what = format!("expected the shape ({first}, {N}), got {shape:?}");
+            return Err(self.error(demo, name, what));
         }
+        Ok(self.finite_array(demo, name)?.values.as_chunks::<N>().0.to_vec())
     }
 
     /// Reads a demonstration without its images.
@@ -449,40 +453,22 @@ impl TaskFile {
     }
 }
 
-const SIGNATURE: &[u8] = b"\x89HDF\r\n\x1a\n";
-
-/// End of the file according to its superblock; 0 if that is unknown, `u64::MAX` if the superblock itself is
-/// truncated, `None` if there is no HDF5 signature. Other data may precede the signature, 512 · 2ⁿ bytes long
-/// (HDF5 file format, II.A).
-fn end_of_file(path: &Path) -> Option<u64> {
-    let mut file = File::open(path).ok()?;
-    let mut head = |from: u64| -> Option<Vec<u8>> {
-        let mut head = Vec::new();
-        file.seek(SeekFrom::Start(from)).ok()?;
-        file.by_ref().take(64).read_to_end(&mut head).ok()?;
-        (!head.is_empty()).then_some(head)
+/// The object that `name` is a link to, as an error; `None` if it lies in `group` itself or is missing.
+fn link(group: &H5Group, name: &str) -> Option<String> {
+    let target = match group.link_class(name) {
+        Ok(LinkClass::Soft { path }) => path,
+        Ok(LinkClass::External { file, path }) => format!("{path} in the file {file}"),
+        Ok(LinkClass::UserDefined { link_type }) => {
+            format!("an object of the user-defined class {link_type}")
+        }
+        // The library opens a group under the first path that leads to it.
+        Ok(LinkClass::Hard) | Err(_) => {
+            let opened = group.group(name).ok()?.name().to_owned();
+            let own = format!("{}/{name}", group.name().trim_end_matches('/'));
+            (opened != own).then_some(opened)?
+        }
     };
-    let first = head(0)?;
-    if first.starts_with(SIGNATURE) {
-        return Some(superblock_end(&first).unwrap_or(u64::MAX));
-    }
-    let mut heads = (9..63).map_while(|power| head(1 << power));
-    heads.any(|head| head.starts_with(SIGNATURE)).then_some(0)
-}
-
-/// End of the file in a superblock; 0 if its addresses are not 8 bytes wide, `None` if it is truncated.
-fn superblock_end(head: &[u8]) -> Option<u64> {
-    // Signature, versions, sizes and flags are followed by base address, extension or free-space
-    // address, and end address.
-    let (width, at) = match head.get(8)? {
-        0 => (13, 40),
-        1 => (13, 44),
-        _ => (9, 28),
-    };
-    if *head.get(width)? != 8 {
-        return Some(0);
-    }
-    Some(u64::from_le_bytes(head.get(at..at + 8)?.try_into().ok()?))
+    Some(format!("it is a link to {target}; expected the data itself"))
 }
 
 /// True if the text that rust-hdf5 returns for the integer of a group is `expected`: its bytes up to the first zero.

@@ -23,7 +23,7 @@ pub(crate) struct ChunkedSteps {
     pub per_chunk: usize,
 }
 
-/// Attributes of a demonstration beside its record, which has them too.
+/// Attributes of a demonstration, which repeat parts of its record.
 pub(super) struct DemoAttributes<'a> {
     pub numbers: [(&'static str, i64); 5],
     pub texts: [(&'static str, &'a str); 4],
@@ -51,9 +51,6 @@ impl<'a> DemoAttributes<'a> {
 }
 
 /// Writes a file that appears complete or not at all. `total` is the number of steps in all `demos` demonstrations.
-///
-/// # Errors
-/// The file cannot be written, or `write` fails.
 pub(crate) fn write_file(
     path: &Path,
     environment: &Value,
@@ -72,7 +69,6 @@ pub(crate) fn write_file(
     Ok(files::persist(&temp, path)?)
 }
 
-/// A file that is being written.
 pub(crate) struct Hdf5Writer<'a> {
     file: H5File,
     pub path: &'a Path,
@@ -108,7 +104,6 @@ impl<'a> Hdf5Writer<'a> {
         Ok(group)
     }
 
-    /// Writes the attributes of a demonstration.
     pub(crate) fn write_attributes(
         &mut self,
         demo: usize,

@@ -15,7 +15,7 @@ pub(super) struct DemoReader<'a> {
 
 impl DemoReader<'_> {
     /// An error about the dataset `name`.
-    pub(super) fn error(&self, name: &str, what: impl Into<String>) -> DatasetError {
+    pub(super) fn error(&self, name: &str, what: impl ToString) -> DatasetError {
         self.file.error(self.demo, name, what)
     }
 
@@ -28,21 +28,13 @@ impl DemoReader<'_> {
     }
 
     /// Rows of an array of shape (`steps`, N), or (any number of steps, N).
-    ///
-    /// # Errors
-    /// The array is missing, of another shape or type, or holds a value that is not finite.
     pub(super) fn rows<const N: usize>(
         &self,
         name: &str,
         steps: Option<usize>,
     ) -> Result<Vec<[f64; N]>, DatasetError> {
-        let shape = self.shape(name)?;
-        let is_expected = |rows: usize| rows > 0 && steps.is_none_or(|steps| steps == rows);
-        if !matches!(shape[..], [rows, width] if width == N && is_expected(rows)) {
-            let first = steps.map_or("steps".to_owned(), |steps| steps.to_string());
-            return Err(self.error(name, format!("expected the shape ({first}, {N}), got {shape:?}")));
-        }
-        Ok(self.array(name)?.values.as_chunks::<N>().0.to_vec())
+        self.require_floats(name)?;
+        self.file.rows(self.demo, name, steps)
     }
 
     /// As [`Self::rows`]; `None` if the array is missing.
@@ -55,21 +47,23 @@ impl DemoReader<'_> {
     }
 
     /// A floating-point array of any shape.
-    ///
-    /// # Errors
-    /// The array is missing, of another type, or holds a value that is not finite.
     pub(super) fn array(&self, name: &str) -> Result<FloatArray, DatasetError> {
+        self.require_floats(name)?;
+        self.file.finite_array(self.demo, name)
+    }
+
+    fn require_floats(&self, name: &str) -> Result<(), DatasetError> {
         let data = self.file.dataset(self.demo, name)?;
         let number_type = self.file.number_type(self.demo, name, &data)?;
-        if !matches!(number_type, Some(NumberType::F64 | NumberType::F32)) {
-            let got = match data.datatype() {
-                Ok(DatatypeMessage::FloatingPoint { size, .. }) => format!("float{}", 8 * size),
-                Ok(DatatypeMessage::FixedPoint { .. }) => "integers".to_owned(),
-                _ => "another type".to_owned(),
-            };
-            return Err(self.error(name, format!("expected numbers of type float32 or float64, got {got}")));
+        if matches!(number_type, Some(NumberType::F64 | NumberType::F32)) {
+            return Ok(());
         }
-        self.file.finite_array(self.demo, name)
+        let got = match data.datatype() {
+            Ok(DatatypeMessage::FloatingPoint { size, .. }) => format!("float{}", 8 * size),
+            Ok(DatatypeMessage::FixedPoint { .. }) => "integers".to_owned(),
+            _ => "another type".to_owned(),
+        };
+        Err(self.error(name, format_args!("expected numbers of type float32 or float64, got {got}")))
     }
 }
 

@@ -6,14 +6,12 @@ use softvt_geometry::Pose;
 use softvt_policy::{EncodedGrip, GripTarget, ToolCommand};
 use softvt_scene::InitialStateOverride;
 
-/// Formats that can be imported.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ForeignFormat {
     /// Relative steps for robosuite's controller, as stored by robomimic and LIBERO.
     Libero,
     /// Absolute poses, as stored by SoftVTBench.
     SoftVtBench,
-    /// A recording of softvt.
     Softvt,
 }
 
@@ -28,16 +26,11 @@ impl ForeignFormat {
     }
 }
 
-/// A file of demonstrations.
 #[derive(Clone, Debug)]
 pub struct ForeignFile {
-    /// Path of the file.
     pub path: PathBuf,
-    /// SHA-256 of the file, hexadecimal.
     pub sha256: String,
-    /// Its format.
     pub format: ForeignFormat,
-    /// Its demonstrations, by index.
     pub demos: Vec<ForeignDemo>,
 }
 
@@ -48,24 +41,19 @@ pub struct ForeignFile {
 pub struct ForeignDemo {
     /// Name of its group, such as `demo_3`.
     pub name: String,
-    /// The task that it names.
     pub task: ForeignTask,
-    /// Commands of the tool and the gripper.
     pub commands: Vec<ToolCommand>,
     /// True while the gripper is commanded to hold.
     pub gripper_closed: Vec<bool>,
     /// True while the gripper holds an object and the recorded closure is the measured one, limited by that object.
     pub is_stopped_by_object: Vec<bool>,
-    /// Where it starts.
     pub initial_condition: InitialCondition,
     /// Data the commands were computed from, for the dataset card.
     pub command_source: &'static str,
 }
 
-/// Task named by a foreign demonstration.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ForeignTask {
-    /// Name of the suite.
     pub suite: Option<String>,
     /// Task index in the suite.
     pub id: Option<usize>,
@@ -73,23 +61,17 @@ pub struct ForeignTask {
     pub prompts: Vec<String>,
 }
 
-/// State from which a demonstration starts.
 #[derive(Clone, Debug, PartialEq)]
 pub enum InitialCondition {
-    /// A scene of another simulator.
     OtherSimulator {
         /// Joint angles of the arm, rad, if they are recorded.
         joints: Option<[f64; 7]>,
-        /// Recorded poses of the objects.
         objects: Vec<ForeignObjectPose>,
     },
-    /// An episode of a softvt suite.
     SoftvtEpisode {
-        /// Base seed.
         seed: u64,
         /// Index in the split of demonstrations.
         attempt: u32,
-        /// Overrides of the layout.
         start: InitialStateOverride,
     },
 }
@@ -97,7 +79,6 @@ pub enum InitialCondition {
 /// Pose of an object in the scene of another simulator.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ForeignObjectPose {
-    /// Its name there.
     pub name: String,
     /// Its pose, in the frame that `in_base` tells.
     pub pose: Pose,

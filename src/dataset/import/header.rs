@@ -8,7 +8,6 @@ use super::{
 };
 use softvt_benchmark::CONTROL_HZ;
 
-/// Metadata of a file.
 pub(super) struct Header {
     pub format: ForeignFormat,
     /// `env_args`; null if missing.
@@ -28,10 +27,6 @@ const ROBOSUITE: [&str; 6] = [
 const PANDA: [&str; 2] = ["panda", "franka"];
 
 impl Header {
-    /// Recognises the format of a file.
-    ///
-    /// # Errors
-    /// Unknown format, or an unsupported robot, controller or control rate.
     pub(super) fn read(file: &TaskFile) -> Result<Self, DatasetError> {
         let environment = match file.file_attribute("env_args") {
             Some(_) => file.environment()?,
@@ -39,7 +34,6 @@ impl Header {
         };
         let header = Self { format: format_of(file, &environment)?, environment };
         header.check_robot(file)?;
-        header.check_rate(file)?;
         Ok(header)
     }
 
@@ -60,6 +54,7 @@ impl Header {
         }
     }
 
+    /// Checks that robot, controller and rate are those of softvt.
     fn check_robot(&self, file: &TaskFile) -> Result<(), DatasetError> {
         let refuse = |key: &str, what: String| Err(DatasetError::content(&file.path, key, what));
         let kwargs = &self.environment["env_kwargs"];
@@ -68,7 +63,6 @@ impl Header {
             Value::Array(all) => all.iter().filter_map(|name| Some(name.as_str()?.to_owned())).collect(),
             _ => Vec::new(),
         };
-        let count = listed.len();
         let attributes = ["robot_type", "robot"].into_iter().filter_map(|name| file.file_attribute(name));
         let mut named = listed.into_iter().chain(attributes).filter(|name| !name.is_empty());
         let is_panda = |name: &String| PANDA.iter().any(|panda| name.to_lowercase().contains(panda));
@@ -76,10 +70,6 @@ impl Header {
             let what =
                 format!("the robot is {other}; only demonstrations of a Franka Panda can be re-executed");
             return refuse("/data, robot", what);
-        }
-        if count > 1 {
-            let what = format!("there are {count} robots; expected one");
-            return refuse("/data, attribute env_args, robots", what);
         }
         let controller = &kwargs["controller_configs"];
         let key = "/data, attribute env_args, controller_configs";
@@ -91,29 +81,16 @@ impl Header {
         if controller["control_delta"] == Value::Bool(false) {
             return refuse(key, "control_delta is false; expected steps relative to the tool".to_owned());
         }
-        Ok(())
-    }
-
-    fn check_rate(&self, file: &TaskFile) -> Result<(), DatasetError> {
-        let stated = self.environment["env_kwargs"]["control_freq"].as_f64();
-        let (key, rate) = match stated {
-            Some(rate) => ("/data, attribute env_args, control_freq", rate),
-            None => match file.file_attribute("fps").and_then(|text| rate(&text)) {
-                Some(rate) => ("/data, attribute fps", rate),
-                None => return Ok(()),
-            },
-        };
-        if rate == f64::from(CONTROL_HZ) {
-            return Ok(());
+        let stated = || file.file_attribute("fps").and_then(|text| rate(&text));
+        match kwargs["control_freq"].as_f64().or_else(stated) {
+            Some(rate) if rate != f64::from(CONTROL_HZ) => {
+                refuse("/data", format!("{rate} control steps per second; expected {CONTROL_HZ}"))
+            }
+            _ => Ok(()),
         }
-        let what = format!("{rate} control steps per second; expected {CONTROL_HZ}");
-        Err(DatasetError::content(&file.path, key, what))
     }
 
     /// Translation and rotation of an action of 1.
-    ///
-    /// # Errors
-    /// The scales differ between axes.
     pub(super) fn step_scale(&self, file: &TaskFile) -> Result<StepScale, DatasetError> {
         let stated = &self.environment["env_kwargs"]["controller_configs"]["output_max"];
         let scales: Vec<f64> = match stated {
@@ -153,12 +130,6 @@ fn format_of(file: &TaskFile, environment: &Value) -> Result<ForeignFormat, Data
     }
     let shape = file.shape(first, "actions")?;
     let is_robosuite = || environment["type"] == 1 || ROBOSUITE.iter().any(|name| file.has(first, name));
-    let has_record = || file.text(first, "metadata_json").is_ok_and(|text| text.contains("\"state_hash\""));
-    if !environment["env_name"].is_string() && has_record() {
-        let what = "it names no env_name, and the demonstrations have records of softvt: restore env_args of the recording, \
-                    whose env_name is softvt";
-        return Err(DatasetError::content(&file.path, "/data, attribute env_args", what));
-    }
     match shape[..] {
         [_, 7 | 13] if file.has(first, "obs/eef_pose") => Ok(ForeignFormat::SoftVtBench),
         [_, 7] if is_robosuite() => Ok(ForeignFormat::Libero),
@@ -167,7 +138,7 @@ fn format_of(file: &TaskFile, environment: &Value) -> Result<ForeignFormat, Data
                 "unknown format: actions of shape {shape:?} and neither obs/eef_pose (SoftVTBench: 7 or 13 numbers per action) nor \
                  env_args of type 1, obs/ee_states, ee_pos or joint_states (robomimic, LIBERO: 7 numbers per action)"
             );
-            Err(DatasetError::content(&file.path, format!("/data/demo_{first}"), what))
+            Err(DatasetError::content(&file.path, format_args!("/data/demo_{first}"), what))
         }
     }
 }
@@ -200,15 +171,11 @@ mod tests {
     use super::*;
 
     #[test]
-    fn integer_attributes_are_read_from_their_first_byte_or_from_text() {
+    fn integers_and_rates_are_read_from_their_first_byte_or_from_text() {
         assert_eq!(
             ["", "\u{7}", "\u{14}", "3", "x"].map(whole_number),
             [Some(0), Some(7), Some(20), Some(3), None]
         );
-    }
-
-    #[test]
-    fn rates_are_read_from_their_first_byte_or_from_text() {
         assert_eq!(
             ["", "\u{14}", "<", "2", "20", "12.5"].map(rate),
             [None, Some(20.0), Some(60.0), Some(50.0), Some(20.0), Some(12.5)]

@@ -33,11 +33,8 @@ const INITIAL_TOOL: [f64; 3] = [0.46, 0.0, 0.26];
 const MAX_INITIAL_DISTANCE: f64 = 0.25;
 /// Largest difference of corresponding joint angles in states and observations, rad: playback is not bitwise exact.
 const SAME_JOINTS: f64 = 0.02;
-/// Keys of joint angles.
 const JOINT_KEYS: [&str; 2] = ["obs/joint_states", "obs/robot0_joint_pos"];
 
-/// # Errors
-/// A stream is missing or invalid.
 pub(super) fn demo(reader: DemoReader, header: &Header) -> Result<ForeignDemo, DatasetError> {
     let steps = relative_steps(reader, header)?;
     let model = model(reader)?;
@@ -90,9 +87,6 @@ fn model(reader: DemoReader) -> Result<Option<MujocoModel>, DatasetError> {
 
 /// MuJoCo states before each action. Empty if they are missing, or if their shape is unexpected and there is no model
 /// to check it against: other programs store something else under this key.
-///
-/// # Errors
-/// The states do not fit the model.
 fn states(
     reader: DemoReader,
     steps: usize,
@@ -136,13 +130,10 @@ fn relative_steps(reader: DemoReader, header: &Header) -> Result<Vec<ToolCommand
     actions.iter().map(decode).collect()
 }
 
-/// Joint angles of the arm.
 struct LiberoArm {
     /// Key of the observations.
     name: &'static str,
-    /// As stored.
     observed: Vec<ArmAngles>,
-    /// Before each action.
     before: Vec<ArmAngles>,
 }
 

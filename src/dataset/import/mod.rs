@@ -18,20 +18,15 @@ use sha2::{Digest, Sha256};
 
 use self::demo_reader::DemoReader;
 use super::{DatasetError, TaskFile};
-use softvt_benchmark::CONTROL_DT;
-use softvt_common::episode_id::EpisodeSplit;
-use softvt_common::files::FileError;
-use softvt_common::text::hex;
+use softvt_benchmark::settings::CONTROL_DT;
+use softvt_common::{episode_id::EpisodeSplit, files::FileError, text::hex};
 use softvt_policy::ToolCommand;
-use softvt_runs::record::EpisodeRecord;
 
 pub use foreign::{
     ForeignDemo, ForeignFile, ForeignFormat, ForeignObjectPose, ForeignTask, InitialCondition,
 };
 pub use object_matching::match_objects;
 
-/// Reads all demonstrations of a file.
-///
 /// # Errors
 /// Unknown format, unsupported robot, controller or control rate, or missing or invalid streams.
 pub fn read(path: &Path) -> Result<ForeignFile, DatasetError> {
@@ -50,21 +45,25 @@ pub fn read(path: &Path) -> Result<ForeignFile, DatasetError> {
 }
 
 /// A demonstration of softvt itself: the recorded commands, from the initial state of the same episode.
-///
-/// # Errors
-/// A stream is missing, or the file is not of the split of demonstrations.
 fn softvt_demo(reader: DemoReader) -> Result<ForeignDemo, DatasetError> {
     let record = reader.file.record(reader.demo)?;
+    // A demonstration may have been copied to another place in a file.
+    let contradictions = reader.file.contradictions(reader.demo, &record);
+    if let Some((name, what)) = contradictions.into_iter().find(|(name, _)| *name != "demo_id") {
+        let key = format!("/data/demo_{}, attribute {name}", reader.demo);
+        let what = format!("{what}; the record decides: relabel the imported demonstrations instead");
+        return Err(DatasetError::content(&reader.file.path, key, what));
+    }
     let header = &record.header;
     let id = &header.id;
     if id.split != EpisodeSplit::Demonstration {
         let what = format!("its split is {}; expected demonstration", id.split.name());
         return Err(reader.error("metadata_json", what));
     }
-    check_attributes(reader, &record)?;
     let commands: Vec<ToolCommand> =
         reader.file.actions(reader.demo)?.into_iter().map(ToolCommand::from).collect();
     let binary = reader.rows::<7>("actions_binary", Some(commands.len()))?;
+    check_times(&reader)?;
     Ok(ForeignDemo {
         name: format!("demo_{}", reader.demo),
         task: ForeignTask {
@@ -84,39 +83,18 @@ fn softvt_demo(reader: DemoReader) -> Result<ForeignDemo, DatasetError> {
     })
 }
 
-/// Checks that the attributes and times of a demonstration are those of its record, which decides what is imported.
-///
-/// # Errors
-/// An attribute or a time differs from the record.
-fn check_attributes(reader: DemoReader, record: &EpisodeRecord) -> Result<(), DatasetError> {
-    let DemoReader { file, demo } = reader;
-    // A demonstration may have been copied to another place in a file.
-    let other = file.contradictions(demo, record).into_iter().find(|(name, _)| *name != "demo_id");
-    if let Some((name, what)) = other {
-        let what = format!("{what}; the record decides: relabel the imported demonstrations instead");
-        return Err(DatasetError::content(&file.path, format!("/data/demo_{demo}, attribute {name}"), what));
-    }
+/// Finds times that are not those of control steps: the commands of another rate would be repeated at the wrong one.
+fn check_times(reader: &DemoReader) -> Result<(), DatasetError> {
     if !reader.has("timestamps") {
         return Ok(());
     }
     let times = reader.array("timestamps")?.values;
-    let is_late = |(step, time): &(usize, &f64)| (*time - *step as f64 * CONTROL_DT).abs() > TIME_TOLERANCE;
-    match times.iter().enumerate().find(is_late) {
-        Some((step, time)) => {
-            let expected = step as f64 * CONTROL_DT;
-            Err(reader.error(
-                "timestamps",
-                format!("step {step}: {time} s, expected {expected} s: control steps are 0.05 s"),
-            ))
-        }
-        None => Ok(()),
-    }
+    let is_late = |(step, time): &(usize, &f64)| (*time - *step as f64 * CONTROL_DT).abs() > 1e-6;
+    let late = times.iter().enumerate().find(is_late);
+    let wrong = |(step, time)| format!("step {step}: {time} s, expected multiples of {CONTROL_DT} s");
+    late.map_or(Ok(()), |late| Err(reader.error("timestamps", wrong(late))))
 }
 
-/// Largest error of times, s.
-const TIME_TOLERANCE: f64 = 1e-6;
-
-/// SHA-256 of a file, hexadecimal.
 fn sha256(path: &Path) -> Result<String, DatasetError> {
     let mut file = std::fs::File::open(path).map_err(FileError::io("read", path))?;
     let mut hash = Sha256::new();

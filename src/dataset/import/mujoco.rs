@@ -12,7 +12,6 @@ use quick_xml::{
 use super::{demo_reader::pose_from_row, foreign::ForeignObjectPose};
 use softvt_geometry::Pose;
 
-/// Kinematic tree of a model.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct MujocoModel {
     bodies: Vec<MujocoBody>,
@@ -29,29 +28,17 @@ struct MujocoBody {
     joints: Vec<MujocoJoint>,
 }
 
+/// Numbers of a joint in a state.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum MujocoJoint {
-    Free,
-    Ball,
-    Single,
+struct MujocoJoint {
+    positions: usize,
+    velocities: usize,
 }
 
 impl MujocoJoint {
-    fn positions(self) -> usize {
-        match self {
-            Self::Free => 7,
-            Self::Ball => 4,
-            Self::Single => 1,
-        }
-    }
-
-    fn velocities(self) -> usize {
-        match self {
-            Self::Free => 6,
-            Self::Ball => 3,
-            Self::Single => 1,
-        }
-    }
+    const FREE: Self = Self { positions: 7, velocities: 6 };
+    const BALL: Self = Self { positions: 4, velocities: 3 };
+    const SINGLE: Self = Self { positions: 1, velocities: 1 };
 }
 
 /// Name of the base of robosuite's robots.
@@ -85,12 +72,12 @@ impl MujocoModel {
                     let parent = open.iter().rev().find_map(|body| *body);
                     model.bodies.push(MujocoBody::from_tag(&tag, parent));
                 }
-                (b"freejoint", Some(at)) => model.bodies[at].joints.push(MujocoJoint::Free),
+                (b"freejoint", Some(at)) => model.bodies[at].joints.push(MujocoJoint::FREE),
                 (b"joint", Some(at)) => {
                     model.bodies[at].joints.push(match attribute(&tag, "type").as_deref() {
-                        Some("free") => MujocoJoint::Free,
-                        Some("ball") => MujocoJoint::Ball,
-                        _ => MujocoJoint::Single,
+                        Some("free") => MujocoJoint::FREE,
+                        Some("ball") => MujocoJoint::BALL,
+                        _ => MujocoJoint::SINGLE,
                     })
                 }
                 _ => {}
@@ -113,10 +100,9 @@ impl MujocoModel {
             .try_fold(Pose::identity(), |inner, pose| Some(pose? * inner))
     }
 
-    /// Length of a state vector.
     pub(super) fn state_width(&self) -> usize {
         let joints = self.bodies.iter().flat_map(|body| &body.joints);
-        1 + joints.map(|joint| joint.positions() + joint.velocities()).sum::<usize>()
+        1 + joints.map(|joint| joint.positions + joint.velocities).sum::<usize>()
     }
 
     /// Object poses in a state: free bodies at their positions in the state, bodies fixed to the world at theirs in
@@ -128,9 +114,9 @@ impl MujocoModel {
         let (mut at, mut objects) = (1, Vec::new());
         for (index, body) in self.bodies.iter().enumerate() {
             let first = at;
-            at += body.joints.iter().map(|joint| joint.positions()).sum::<usize>();
+            at += body.joints.iter().map(|joint| joint.positions).sum::<usize>();
             let pose_w = match body.joints[..] {
-                [MujocoJoint::Free] => pose_from_row(&state[first..first + 7]),
+                [MujocoJoint::FREE] => pose_from_row(&state[first..first + 7]),
                 [] if body.parent.is_none() => self.pose(index),
                 _ => None,
             };
@@ -159,7 +145,6 @@ impl MujocoBody {
     }
 }
 
-/// Value of an attribute of a tag.
 fn attribute(tag: &BytesStart, name: &str) -> Option<String> {
     Some(tag.try_get_attribute(name).ok()??.unescape_value().ok()?.into_owned())
 }

@@ -21,8 +21,6 @@ const POSES: &str = "obs/eef_pose";
 const JOINTS: &str = "obs/arm_joint_pos";
 /// Largest distance of the recorded tool point from ours, m: its frame may be slightly farther out.
 const MAX_TOOL_OFFSET: f64 = 0.03;
-/// Difference of mean angles beyond which one quaternion order is taken to be the right one, rad.
-const ORDER_MARGIN: f64 = 0.3;
 /// Largest mean distance of actions from the recorded poses, m and rad.
 const MAX_LEAD_M: f64 = 0.1;
 const MAX_LEAD_RAD: f64 = 0.6;
@@ -39,33 +37,26 @@ const FINGER_RANGE: [f64; 2] = [-0.001, 0.045];
 const FINGER_POSITION: GripperValues = GripperValues::new(0.04, 0.0);
 const SIGN: GripperValues = GripperValues { code: GripCode::Binary, ..GripperValues::new(1.0, -1.0) };
 
-/// An action of 7 numbers.
 struct SoftvtbenchAction {
-    numbers: [f64; 7],
+    position_b: Vec3,
+    axis_angle_b: Vec3,
+    /// Position of a finger (m), or 1 open and -1 closed.
+    gripper: f64,
     /// True if forces are recorded and both fingers are pressed.
     is_pressed: bool,
 }
 
 impl SoftvtbenchAction {
-    fn position(&self) -> Vec3 {
-        Vec3::from_column_slice(&self.numbers[..3])
-    }
-
-    fn axis_angle(&self) -> Vec3 {
-        Vec3::from_column_slice(&self.numbers[3..6])
+    fn new(row: &[f64], is_pressed: bool) -> Self {
+        let [position_b, axis_angle_b] = [&row[..3], &row[3..6]].map(Vec3::from_column_slice);
+        Self { position_b, axis_angle_b, gripper: row[6], is_pressed }
     }
 
     fn rotation(&self) -> Quat {
-        rotation::from_axis_angle(&self.axis_angle())
-    }
-
-    fn gripper(&self) -> f64 {
-        self.numbers[6]
+        rotation::from_axis_angle(&self.axis_angle_b)
     }
 }
 
-/// # Errors
-/// A stream is missing or invalid.
 pub(super) fn demo(reader: DemoReader, header: &Header) -> Result<ForeignDemo, DatasetError> {
     let actions = actions(reader)?;
     let poses = poses(reader, &actions)?;
@@ -76,18 +67,15 @@ pub(super) fn demo(reader: DemoReader, header: &Header) -> Result<ForeignDemo, D
     let gripper = gripper_encoding(reader, &actions)?;
     let is_measured = fingers_are_measured(reader, &actions)?;
     let command = |action: &SoftvtbenchAction| {
-        let position_b = action.position() - action.rotation() * offset_t;
-        let closure = gripper.closure(action.gripper()).clamp(0.0, 1.0);
-        ToolCommand::from(Action::new(position_b, action.axis_angle(), closure))
+        let position_b = action.position_b - action.rotation() * offset_t;
+        let closure = gripper.closure(action.gripper).clamp(0.0, 1.0);
+        ToolCommand::from(Action::new(position_b, action.axis_angle_b, closure))
     };
     let start = initial_joints(reader)?;
     Ok(ForeignDemo {
         name: format!("demo_{}", reader.demo),
         task: header.task(reader.file, reader.demo),
-        gripper_closed: actions
-            .iter()
-            .map(|action| action.is_pressed || gripper.closure(action.gripper()) > 0.5)
-            .collect(),
+        gripper_closed: actions.iter().map(|a| a.is_pressed || gripper.closure(a.gripper) > 0.5).collect(),
         is_stopped_by_object: actions.iter().map(|action| is_measured && action.is_pressed).collect(),
         commands: actions.iter().map(command).collect(),
         initial_condition: InitialCondition::OtherSimulator {
@@ -102,9 +90,6 @@ pub(super) fn demo(reader: DemoReader, header: &Header) -> Result<ForeignDemo, D
 }
 
 /// Joint angles of the arm at the start, if they are recorded.
-///
-/// # Errors
-/// Not the joint vector of a Panda: 7 angles, or 9 with both fingers.
 fn initial_joints(reader: DemoReader) -> Result<Option<[f64; 7]>, DatasetError> {
     const KEY: &str = "initial_state/articulation/robot/joint_position";
     if !reader.has(KEY) {
@@ -130,60 +115,29 @@ fn actions(reader: DemoReader) -> Result<Vec<SoftvtbenchAction>, DatasetError> {
     const KEY: &str = "actions";
     if reader.shape(KEY)?.get(1) == Some(&7) {
         let rows = reader.rows::<7>(KEY, None)?;
-        return Ok(rows
-            .into_iter()
-            .map(|numbers| SoftvtbenchAction { numbers, is_pressed: false })
-            .collect());
+        return Ok(rows.iter().map(|row| SoftvtbenchAction::new(row, false)).collect());
     }
     let is_pressed = |force: &[f64]| Vec3::from_column_slice(force).norm() > MIN_HOLD_FORCE;
-    let action = |row: &[f64; 13]| SoftvtbenchAction {
-        numbers: std::array::from_fn(|i| row[i]),
-        is_pressed: is_pressed(&row[7..10]) && is_pressed(&row[10..]),
-    };
-    Ok(reader.rows::<13>(KEY, None)?.iter().map(action).collect())
+    let rows = reader.rows::<13>(KEY, None)?;
+    let action =
+        |row: &[f64; 13]| SoftvtbenchAction::new(row, is_pressed(&row[7..10]) && is_pressed(&row[10..]));
+    Ok(rows.iter().map(action).collect())
 }
 
-/// Recorded poses of the tool.
-///
-/// # Errors
-/// Not unit quaternions, or in the order x y z w.
 fn poses(reader: DemoReader, actions: &[SoftvtbenchAction]) -> Result<RecordedPoses, DatasetError> {
     let rows = reader.rows::<7>(POSES, Some(actions.len()))?;
     if let Some(step) = rows.iter().position(|row| !is_unit(&row[3..])) {
         let what = format!("step {step}: not a unit quaternion w x y z: {:?}", &rows[step][3..]);
         return Err(reader.error(POSES, what));
     }
-    let in_order = |[w, x, y, z]: [usize; 4]| -> Vec<Quat> {
-        let q = |row: &[f64; 7]| nalgebra::Quaternion::new(row[3 + w], row[3 + x], row[3 + y], row[3 + z]);
-        rows.iter().map(|row| Quat::new_normalize(q(row))).collect()
-    };
-    let commanded: Vec<Quat> = actions.iter().map(SoftvtbenchAction::rotation).collect();
-    let wxyz = in_order([0, 1, 2, 3]);
-    let angle_wxyz = tool_pose::mean_angle(&wxyz, &commanded);
-    let angle_xyzw = tool_pose::mean_angle(&in_order([3, 0, 1, 2]), &commanded);
-    if angle_xyzw + ORDER_MARGIN < angle_wxyz {
-        let what = format!(
-            "its quaternions are in the order x y z w: {:.0}° from the actions' rotations as w x y z, {:.0}° as x y z w; expected w x \
-             y z",
-            angle_wxyz.to_degrees(),
-            angle_xyzw.to_degrees()
-        );
-        return Err(reader.error(POSES, what));
-    }
-    let pose = |(row, rotation): (&[f64; 7], Quat)| {
-        Pose::from_parts(Vec3::new(row[0], row[1], row[2]).into(), rotation)
-    };
-    Ok(RecordedPoses { name: POSES, poses: rows.iter().zip(wxyz).map(pose).collect() })
+    Ok(RecordedPoses { name: POSES, poses: rows.iter().filter_map(|row| pose_from_row(row)).collect() })
 }
 
 /// Checks that actions are near the recorded poses: they lead the tool, but not far.
-///
-/// # Errors
-/// Not absolute poses in the base frame in m and rad.
 fn check_lead(reader: DemoReader, actions: &[SoftvtbenchAction], poses: &[Pose]) -> Result<(), DatasetError> {
     let (mut distance, mut angle) = (0.0, 0.0);
     for (action, pose) in actions.iter().zip(poses) {
-        distance += (action.position() - pose.translation.vector).norm();
+        distance += (action.position_b - pose.translation.vector).norm();
         angle += action.rotation().angle_to(&pose.rotation);
     }
     let (distance, angle) = (distance / poses.len() as f64, angle / poses.len() as f64);
@@ -199,9 +153,6 @@ fn check_lead(reader: DemoReader, actions: &[SoftvtbenchAction], poses: &[Pose])
 }
 
 /// Position of the recorded tool point in our tool frame, m.
-///
-/// # Errors
-/// The offset is too large or not constant: another robot or frame.
 fn tool_offset(reader: DemoReader, poses: &RecordedPoses, joints: &[[f64; 7]]) -> Result<Vec3, DatasetError> {
     let from_joints = tool_pose::forward_kinematics(reader, JOINTS, joints)?;
     let offset_t = tool_pose::tool_offset(reader, poses, &from_joints)?;
@@ -216,23 +167,20 @@ fn tool_offset(reader: DemoReader, poses: &RecordedPoses, joints: &[[f64; 7]]) -
 }
 
 /// Encoding of the gripper: a finger position, or 1 open and -1 closed.
-///
-/// # Errors
-/// The values fit neither encoding.
 fn gripper_encoding(
     reader: DemoReader,
     actions: &[SoftvtbenchAction],
 ) -> Result<GripperValues, DatasetError> {
     let is_position = |x: f64| (FINGER_RANGE[0]..=FINGER_RANGE[1]).contains(&x);
-    let Some(step) = actions.iter().position(|action| !is_position(action.gripper())) else {
+    let Some(step) = actions.iter().position(|action| !is_position(action.gripper)) else {
         return Ok(FINGER_POSITION);
     };
-    if actions.iter().all(|action| action.gripper().abs() == 1.0) {
+    if actions.iter().all(|action| action.gripper.abs() == 1.0) {
         return Ok(SIGN);
     }
     let what = format!(
         "step {step}, number 6: {}, expected a finger's position of 0 (closed) to 0.04 m, or only 1 (open) and -1 (closed)",
-        actions[step].gripper()
+        actions[step].gripper
     );
     Err(reader.error("actions", what))
 }
@@ -241,7 +189,7 @@ fn gripper_encoding(
 fn fingers_are_measured(reader: DemoReader, actions: &[SoftvtbenchAction]) -> Result<bool, DatasetError> {
     let fingers = reader.rows_if_present::<2>("obs/gripper_pos", actions.len())?;
     let is_measured =
-        |action: &SoftvtbenchAction, finger: f64| (action.gripper() - finger).abs() < MEASURED_TOLERANCE;
+        |action: &SoftvtbenchAction, finger: f64| (action.gripper - finger).abs() < MEASURED_TOLERANCE;
     Ok(fingers
         .is_some_and(|fingers| actions.iter().zip(fingers).all(|(a, finger)| is_measured(a, finger[0]))))
 }

@@ -31,9 +31,6 @@ pub(super) struct RecordedPoses {
 }
 
 /// Joint angles of the arm per step, rad.
-///
-/// # Errors
-/// The array is missing, or its shape is not (`steps`, 7).
 pub(super) fn joint_angles(
     reader: DemoReader,
     name: &str,
@@ -49,9 +46,6 @@ pub(super) fn joint_angles(
 }
 
 /// Tool poses in the base frame for joint angles recorded under `name`.
-///
-/// # Errors
-/// An angle is outside of a Panda's limits.
 pub(super) fn forward_kinematics(
     reader: DemoReader,
     name: &str,
@@ -78,7 +72,6 @@ pub(super) fn forward_kinematics(
     Ok(joints.iter().map(|q| arm.tool_pose(q)).collect())
 }
 
-/// Clamps joint angles to the limits.
 pub(super) fn clamp_to_limits(mut q: ArmAngles) -> ArmAngles {
     for (q, link) in q.iter_mut().zip(panda::arm_chain().links) {
         *q = q.clamp(link.lower, link.upper);
@@ -89,9 +82,6 @@ pub(super) fn clamp_to_limits(mut q: ArmAngles) -> ArmAngles {
 /// Compares recorded poses with those of the joint angles, up to a constant offset of base and tool.
 ///
 /// Returns the mean position of the recorded point in our tool frame, m.
-///
-/// # Errors
-/// The offset is not constant: another robot, another quaternion order, or steps that do not correspond.
 pub(super) fn tool_offset(
     reader: DemoReader,
     recorded: &RecordedPoses,
@@ -142,17 +132,9 @@ fn wrong_hand_orientation(rotation: &Quat, max_tilt: f64, expected: &str) -> Opt
 }
 
 /// Compares the first recorded pose with a usual initial pose; used where there are no joint angles.
-///
-/// # Errors
-/// The hand points elsewhere, or is rotated by half a turn: another order of the quaternion's numbers.
 pub(super) fn check_first_pose(reader: DemoReader, recorded: &RecordedPoses) -> Result<(), DatasetError> {
     let home = DiffIk::new(&IkSpec::default(), HOME, CONTROL_DT).tool_pose(&HOME);
     let rotation = home.rotation.inverse() * recorded.poses[0].rotation;
     wrong_hand_orientation(&rotation, MAX_TILT_FROM_HOME, "the usual initial pose")
         .map_or(Ok(()), |what| Err(reader.error(recorded.name, what)))
-}
-
-/// Mean angle between two sequences of rotations, rad.
-pub(super) fn mean_angle(a: &[Quat], b: &[Quat]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| a.angle_to(b)).sum::<f64>() / a.len().max(1) as f64
 }

@@ -13,7 +13,7 @@
 //! The weights of the score ([`METRIC_ID`]) are the volumes that the nodes stand for, so that D approximates an
 //! integral over the body, whatever its mesh and however it is turned against the voxels. SoftVTBench's released code
 //! weights all nodes alike and takes the box along the axes of the world ([`V1_METRIC_ID`]); that value is reported
-//! beside it. The reference is the settled shape, so sagging under gravity does not count.
+//! too. The reference is the settled shape, so sagging under gravity does not count.
 
 pub mod series;
 
@@ -30,25 +30,10 @@ pub const V1_METRIC_ID: &str = "fem_rms_rigid_aligned_bbox_pct_v1";
 /// Diagonal of a bounding box below which a body counts as a point, m.
 const SMALLEST_DIAGONAL_M: f64 = 1e-12;
 
-/// Reasons why a deformation cannot be measured.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-#[allow(missing_docs, reason = "the messages describe the variants")]
-pub enum DeformationError {
-    #[error("a deformation needs at least 3 nodes, got {0}: use a finer voxel mesh")]
-    TooFewNodes(usize),
-    #[error("{nodes} nodes but {weights} node weights: give one weight per node")]
-    WeightCount { nodes: usize, weights: usize },
-    #[error("node weight {node} is {value}: weights must be finite, not negative, and not all zero")]
-    BadWeight { node: usize, value: f64 },
-    #[error(
-        "the reference has {expected} nodes, the measured body {got}: measure the body the reference is of"
-    )]
-    NodeCount { expected: usize, got: usize },
-    #[error("node {node} is not finite ({x}, {y}, {z}): the simulation has diverged")]
-    NonFinite { node: usize, x: f64, y: f64, z: f64 },
-    #[error("the reference's bounding-box diagonal is {0} m: the body has no size")]
-    NoSize(f64),
-}
+/// A deformation cannot be measured.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("{0}")]
+pub struct DeformationError(String);
 
 /// Deformation of a body at one moment; percentages are of [`ReferenceShape::diagonal_m`] unless said otherwise.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -100,23 +85,29 @@ impl ReferenceShape {
     /// Fewer than three nodes, a node that is not finite, a body without size, or weights that are not one per node,
     /// negative, not finite or all zero.
     pub fn new(nodes: &[Vec3], weights: &[f64]) -> Result<Self, DeformationError> {
+        let refuse = |problem: String| Err(DeformationError(problem));
         if nodes.len() < 3 {
-            return Err(DeformationError::TooFewNodes(nodes.len()));
+            return refuse(format!("a deformation needs at least 3 nodes, got {}", nodes.len()));
         }
         if nodes.len() != weights.len() {
-            return Err(DeformationError::WeightCount { nodes: nodes.len(), weights: weights.len() });
+            return refuse(format!("{} nodes but {} node weights", nodes.len(), weights.len()));
         }
-        check_finite(nodes)?;
+        require_finite(nodes)?;
         let total: f64 = weights.iter().sum();
         let bad = weights.iter().position(|w| !w.is_finite() || *w < 0.0);
         if let Some(node) = bad.or((total <= 0.0 || !total.is_finite()).then_some(0)) {
-            return Err(DeformationError::BadWeight { node, value: weights[node] });
+            let weight = weights[node];
+            return refuse(format!(
+                "node weight {node} is {weight}: weights must be finite, not negative, and not all zero"
+            ));
         }
         let weights: Vec<f64> = weights.iter().map(|w| w / total).collect();
         let bbox_m = Aabb::from_points(nodes).map_or_else(Vec3::zeros, |bounds| bounds.size());
         let diagonal_m = bbox_m.norm();
         if diagonal_m <= SMALLEST_DIAGONAL_M || !diagonal_m.is_finite() {
-            return Err(DeformationError::NoSize(diagonal_m));
+            return refuse(format!(
+                "the diagonal of the bounding box is {diagonal_m} m: the body has no size"
+            ));
         }
         // Means are taken about the first node: a small body far from the origin loses no digits.
         let mean = nodes[0] + nodes.iter().map(|x| x - nodes[0]).sum::<Vec3>() / nodes.len() as f64;
@@ -163,7 +154,10 @@ impl ReferenceShape {
     /// Another number of nodes than the reference has, or a node that is not finite.
     pub fn measure(&self, nodes: &[Vec3]) -> Result<Deformation, DeformationError> {
         if nodes.len() != self.nodes.len() {
-            return Err(DeformationError::NodeCount { expected: self.nodes.len(), got: nodes.len() });
+            let (expected, got) = (self.nodes.len(), nodes.len());
+            return Err(DeformationError(format!(
+                "the reference has {expected} nodes, the measured body {got}"
+            )));
         }
         let sums = self.sums(nodes)?;
         let rotation = best_rotation(&sums.weighted_product);
@@ -209,7 +203,7 @@ impl ReferenceShape {
         weighted_product -= weighted_sum * self.weighted_centre.transpose();
         // An eigenvector search must not be given a NaN.
         if !product.iter().chain(weighted_product.iter()).all(|v| v.is_finite()) {
-            check_finite(nodes)?;
+            require_finite(nodes)?;
             return Err(far_node(nodes));
         }
         let mean = sum / nodes.len() as f64;
@@ -238,7 +232,7 @@ fn best_rotation(product: &Mat3) -> Quat {
     Quat::from_quaternion(Quaternion::new(q[0], q[1], q[2], q[3]) * sign)
 }
 
-fn check_finite(nodes: &[Vec3]) -> Result<(), DeformationError> {
+fn require_finite(nodes: &[Vec3]) -> Result<(), DeformationError> {
     let bad = nodes.iter().position(|x| !x.iter().all(|v| v.is_finite()));
     bad.map_or(Ok(()), |node| Err(non_finite(nodes, node)))
 }
@@ -250,7 +244,10 @@ fn far_node(nodes: &[Vec3]) -> DeformationError {
 
 fn non_finite(nodes: &[Vec3], node: usize) -> DeformationError {
     let p = nodes[node];
-    DeformationError::NonFinite { node, x: p.x, y: p.y, z: p.z }
+    DeformationError(format!(
+        "node {node} is not finite ({}, {}, {}): the simulation has diverged",
+        p.x, p.y, p.z
+    ))
 }
 
 #[cfg(test)]

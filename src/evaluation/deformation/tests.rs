@@ -85,31 +85,23 @@ fn collapse_to_a_point_has_its_closed_form() {
 }
 
 #[test]
-fn the_rotation_that_is_removed_would_be_38_percent_at_a_quarter_turn() {
-    let (reference, nodes) = reference();
-    let turn = Quat::from_axis_angle(&Vec3::z_axis(), std::f64::consts::FRAC_PI_2);
-    let centre = Vec3::repeat(0.03);
-    let sum: f64 = nodes.iter().map(|x| (turn * (x - centre) - (x - centre)).norm_squared()).sum();
-    let unremoved = 100.0 * (sum / nodes.len() as f64).sqrt() / reference.diagonal_m();
-    assert!((unremoved - 38.5).abs() < 0.05, "{unremoved}");
-    assert!(reference.measure(&map(&nodes, |x| turn * x)).unwrap().rms_pct < 1e-11);
-}
-
-#[test]
 fn bad_input_is_refused_by_name() {
     let (reference, nodes) = reference();
-    let new = |n: &[Vec3], w: &[f64]| ReferenceShape::new(n, w).unwrap_err();
-    assert_eq!(new(&nodes[..2], &[1.0; 2]), DeformationError::TooFewNodes(2));
-    assert_eq!(new(&nodes[..4], &[1.0; 3]), DeformationError::WeightCount { nodes: 4, weights: 3 });
-    assert!(matches!(new(&nodes[..3], &[1.0, -1.0, 1.0]), DeformationError::BadWeight { node: 1, .. }));
-    assert!(matches!(new(&nodes[..3], &[0.0; 3]), DeformationError::BadWeight { .. }));
-    assert!(matches!(new(&[Vec3::x(); 4], &[1.0; 4]), DeformationError::NoSize(_)));
-    assert!(matches!(reference.measure(&nodes[1..]), Err(DeformationError::NodeCount { got: 342, .. })));
+    let refused = |n: &[Vec3], w: &[f64], words: &str| {
+        let error = ReferenceShape::new(n, w).unwrap_err().to_string();
+        assert!(error.contains(words), "{error}");
+    };
+    refused(&nodes[..2], &[1.0; 2], "3 nodes, got 2");
+    refused(&nodes[..4], &[1.0; 3], "4 nodes but 3 node weights");
+    refused(&nodes[..3], &[1.0, -1.0, 1.0], "node weight 1 is -1");
+    refused(&nodes[..3], &[0.0; 3], "node weight 0 is 0");
+    refused(&[Vec3::x(); 4], &[1.0; 4], "has no size");
+    assert!(reference.measure(&nodes[1..]).unwrap_err().to_string().contains("the measured body 342"));
     for bad in [f64::NAN, f64::INFINITY, 1e200] {
         let mut broken = nodes.clone();
         broken[17].y = bad;
-        let error = reference.measure(&broken).unwrap_err();
-        assert!(matches!(error, DeformationError::NonFinite { node: 17, .. }), "{bad}: {error}");
+        let error = reference.measure(&broken).unwrap_err().to_string();
+        assert!(error.starts_with("node 17 is not finite"), "{bad}: {error}");
     }
 }
 

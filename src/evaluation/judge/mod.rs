@@ -28,7 +28,7 @@
 //! one of them.
 //!
 //! At the end ([`Judge::finish`]): Safety Success = Goal ∧ NoDrop ∧ D_peak ≤ τ for each target, and NoSlip if the
-//! criteria require it ([`super::safety`]). Reported beside it: *gentle*, Goal with a grip ratio of at most
+//! criteria require it ([`super::safety`]). Reported in addition: *gentle*, Goal with a grip ratio of at most
 //! `gentle_ratio`, and the nested successes of the SoftTacWorld challenge. Contact success is Goal with contact of both
 //! pads throughout the carry; contact safety is contact success with Safety and NoSlip.
 //!
@@ -46,7 +46,7 @@
 //!     },
 //!     goal::GoalRegion,
 //!     goal_tree::GoalNode,
-//!     judge::{Judge, JudgeConfig, Predicate, PredicateRule, Target},
+//!     judge::{Judge, JudgeConfig, JudgedBody, Predicate, PredicateRule},
 //!     safety::DeformationLimit,
 //!     verdict::Outcome,
 //! };
@@ -62,10 +62,11 @@
 //!         name: "bun on plate".into(),
 //!         rule: PredicateRule::Rests { target: 0, region, hold_s: 0.4 },
 //!     }],
-//!     targets: vec![Target {
+//!     targets: vec![JudgedBody {
 //!         name: "bun".into(),
 //!         weight_n,
 //!         is_soft: true,
+//!         is_goal: false,
 //!         limit: Some(DeformationLimit { d_ref_pct: 2.0, kappa: 0.5 }),
 //!         lowest_z_w: 0.0,
 //!     }],
@@ -139,9 +140,9 @@ pub struct JudgeConfig {
     /// Predicates of the goal, in the order of the evidence.
     pub predicates: Vec<Predicate>,
     /// The objects that the task moves, in the order of the evidence; the first is *the object*.
-    pub targets: Vec<Target>,
+    pub targets: Vec<JudgedBody>,
     /// The other movable bodies, in the order of the evidence.
-    pub others: Vec<OtherBody>,
+    pub others: Vec<JudgedBody>,
     /// Physics step, s.
     pub dt_s: f64,
     /// Physics steps per control step.
@@ -153,9 +154,9 @@ pub struct JudgeConfig {
 /// A predicate of a goal.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Predicate {
-    /// What holds, in words: "bun on plate".
+    /// Description in words: "bun on plate".
     pub name: String,
-    /// When it holds.
+    /// Condition under which it holds.
     pub rule: PredicateRule,
 }
 
@@ -178,30 +179,17 @@ pub enum PredicateRule {
     },
 }
 
-/// An object that the task moves, once the scene has settled.
+/// A movable body, once the scene has settled.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Target {
+pub struct JudgedBody {
     /// Name in the scene.
     pub name: String,
-    /// Weight, N.
+    /// Weight, N; used for targets alone.
     pub weight_n: f64,
     /// True if it is a soft body; for a rigid one deformation does not apply.
     pub is_soft: bool,
-    /// Its deformation limit; `None` if its asset was never calibrated.
-    pub limit: Option<DeformationLimit>,
-    /// Height of its lowest point after settling, m.
-    pub lowest_z_w: f64,
-}
-
-/// A movable body that is not a target, once the scene has settled.
-#[derive(Clone, Debug, PartialEq)]
-pub struct OtherBody {
-    /// Name in the scene.
-    pub name: String,
     /// True for an object that a target must be placed on or in, which may be lifted first.
     pub is_goal: bool,
-    /// True if it is a soft body.
-    pub is_soft: bool,
     /// Its deformation limit; `None` if its asset was never calibrated.
     pub limit: Option<DeformationLimit>,
     /// Height of its lowest point after settling, m.
@@ -225,7 +213,7 @@ pub struct ControlStepScore {
     pub targets: Vec<WorstSteps>,
 }
 
-/// What a predicate has shown so far.
+/// State of a predicate up to the present step.
 #[derive(Clone, Copy, Debug)]
 struct PredicateState {
     placement: PlacementMonitor,
@@ -310,7 +298,8 @@ impl Judge {
             self.observe_handling(evidence, is_last);
         } else {
             self.missing_evidence += 1;
-            self.drop_all(DropReason::NoEvidence);
+            let time_s = self.time_s;
+            self.targets.iter_mut().for_each(|target| target.drops.record(DropReason::NoEvidence, time_s));
         }
         if is_last {
             self.targets.iter_mut().for_each(|target| target.was_touched = false);
@@ -320,15 +309,14 @@ impl Judge {
         }
     }
 
-    fn drop_all(&mut self, reason: DropReason) {
-        let time_s = self.time_s;
-        self.targets.iter_mut().for_each(|target| target.drops.record(reason, time_s));
-    }
-
     /// Contacts, lift, release, slip, grip, drop and goal. `is_last` at the last physics step of a control step.
     fn observe_handling(&mut self, evidence: &Evidence<'_>, is_last: bool) {
         self.time_s = evidence.time_s;
-        self.observe_wrong_contact(evidence);
+        if self.first_wrong_contact.is_none() {
+            let least_n = self.config.criteria.touch_force_n;
+            let touched = evidence.others.iter().position(|body| body.robot_force_n > least_n);
+            self.first_wrong_contact = touched.map(|other| FirstContact { time_s: evidence.time_s, other });
+        }
         self.observe_lift(evidence);
         let config = &self.config;
         let is_opening = self.opening.update(evidence.gripper.commanded_width_m, config.steps_per_control);
@@ -489,14 +477,6 @@ impl Judge {
             }
         })
         .collect()
-    }
-
-    fn observe_wrong_contact(&mut self, evidence: &Evidence<'_>) {
-        let least_n = self.config.criteria.touch_force_n;
-        if self.first_wrong_contact.is_none() {
-            let touched = evidence.others.iter().position(|body| body.robot_force_n > least_n);
-            self.first_wrong_contact = touched.map(|other| FirstContact { time_s: evidence.time_s, other });
-        }
     }
 
     /// Keeps whether a target was lifted before any other object.

@@ -101,7 +101,7 @@ impl Scene {
     fn judge(&self) -> Judge {
         let of = |(at, (&is_soft, &has_limit)): (usize, (&bool, &bool))| {
             let of = target(&format!("target {at}"));
-            Target { is_soft, limit: of.limit.filter(|_| has_limit), ..of }
+            JudgedBody { is_soft, limit: of.limit.filter(|_| has_limit), ..of }
         };
         let mut config = config();
         config.targets = self.is_soft.iter().zip(&self.has_limit).enumerate().map(of).collect();
@@ -162,7 +162,15 @@ fn is_within(d_peak: Option<f64>, missing: u64, tau: Option<f64>) -> Option<bool
     }
 }
 
-fn check_target(of: &TargetVerdict, is_valid: bool, time_s: f64) -> Result<(), TestCaseError> {
+/// The verdict on target `at` of a scene against its series of D.
+fn compare(scene: &Scene, at: usize, of: &TargetVerdict, time_s: f64) -> Result<(), TestCaseError> {
+    let (is_soft, is_valid) = (scene.is_soft[at], scene.is_valid);
+    let series =
+        || scene.phases.iter().map(|phase| (phase.steps, phase.targets[at].d_pct)).filter(|_| is_soft);
+    prop_assert_eq!(of.d_peak, series().filter_map(|(_, d_pct)| d_pct).reduce(f64::max));
+    let missing = series().filter(|(_, d_pct)| d_pct.is_none()).map(|(steps, _)| u64::from(steps));
+    prop_assert_eq!(of.missing_deformation, missing.sum::<u64>());
+    prop_assert_eq!(of.tau.is_some(), is_soft && scene.has_limit[at]);
     let shares = [of.collapsed_volume_pct, of.damaged_volume_pct].into_iter().flatten();
     prop_assert!(shares.clone().all(|pct| (0.0..=100.0).contains(&pct)));
     let course = [of.d_mean, of.d_final, of.d_p95].into_iter().flatten();
@@ -195,15 +203,19 @@ proptest! {
             (false, _) => Outcome::Invalid { reason: InvalidReason::Inverted, step: 1, node: None },
         };
         let v = judge.finish(&outcome);
-        let (time_s, is_valid) = (judge.steps as f64 * DT, outcome.is_valid());
+        let (time_s, is_valid) = (judge.steps as f64 * DT, scene.is_valid);
         prop_assert_eq!(v.targets.len(), scene.is_soft.len());
-        for target in &v.targets {
-            check_target(target, is_valid, time_s)?;
+        for (at, target) in v.targets.iter().enumerate() {
+            compare(&scene, at, target, time_s)?;
         }
+        let unread = scene.phases.iter().filter(|phase| !phase.is_finite).map(|phase| u64::from(phase.steps));
+        prop_assert_eq!(v.missing_evidence, unread.sum::<u64>());
+        prop_assert!(v.missing_evidence == 0 || !v.no_drop);
 
         // The goal and drops with their events.
         prop_assert_eq!(v.goal, outcome == Outcome::Completed);
         prop_assert_eq!(v.goal, v.goal_time_s.is_some_and(|at_s| (0.0..=time_s + 1e-9).contains(&at_s)));
+        prop_assert!(is_valid || !v.goal_v1);
         prop_assert!(v.goal || !(v.goal_untouched || v.gentle || v.contact_success));
         prop_assert!(!v.goal || v.failed_stage.is_none());
         prop_assert!(v.goal_parts.iter().all(|part| !part.holds || part.met_s.is_some()));

@@ -10,7 +10,7 @@ use crate::{
     verdict::{Handling, TargetVerdict},
 };
 
-use super::{JudgeConfig, Target};
+use super::{JudgeConfig, JudgedBody};
 
 /// Normal forces on the pads over the episode.
 #[derive(Clone, Copy, Debug, Default)]
@@ -50,7 +50,7 @@ pub(super) struct TargetMonitors {
 
 impl TargetMonitors {
     /// Monitors of a target that has not moved; the episode has at most `steps` physics steps.
-    pub(super) fn new(target: &Target, steps: usize) -> Self {
+    pub(super) fn new(target: &JudgedBody, steps: usize) -> Self {
         Self {
             release: ReleaseMonitor::default(),
             drops: DropMonitor::default(),
@@ -132,7 +132,7 @@ impl TargetMonitors {
     pub(super) fn finish(
         &self,
         config: &JudgeConfig,
-        target: &Target,
+        target: &JudgedBody,
         is_object: bool,
         missing: Option<DropEvent>,
     ) -> TargetResult {
@@ -179,7 +179,7 @@ impl TargetMonitors {
     }
 }
 
-/// What was found of a target.
+/// Measurements of a target.
 #[derive(Clone, Debug)]
 pub(super) struct TargetResult {
     pub(super) verdict: TargetVerdict,

@@ -2,16 +2,16 @@ use super::*;
 use crate::{
     deformation::Deformation,
     evidence::{CrushedShares, GripEvidence, GripperEvidence, PadEvidence, TargetEvidence},
-    verdict::InvalidReason,
 };
 use softvt_geometry::{Aabb, Pose, Quat, Vec3};
 
 pub(super) const DT: f64 = 1.0 / 60.0;
 pub(super) const WEIGHT_N: f64 = 0.3;
 
-pub(super) fn target(name: &str) -> Target {
+pub(super) fn target(name: &str) -> JudgedBody {
     let limit = Some(DeformationLimit { d_ref_pct: 2.0, kappa: 0.5 });
-    Target { name: name.into(), weight_n: WEIGHT_N, is_soft: true, limit, lowest_z_w: 0.0 }
+    let name = name.into();
+    JudgedBody { name, weight_n: WEIGHT_N, is_soft: true, is_goal: false, limit, lowest_z_w: 0.0 }
 }
 
 /// A target rests on the plate.
@@ -29,12 +29,9 @@ pub(super) fn config() -> JudgeConfig {
         targets: vec![target("bun")],
         dt_s: DT,
         steps_per_control: 3,
-        others: vec![OtherBody {
-            name: "other".into(),
-            is_goal: false,
-            is_soft: true,
+        others: vec![JudgedBody {
             limit: Some(DeformationLimit { d_ref_pct: 3.0, kappa: 0.5 }),
-            lowest_z_w: 0.0,
+            ..target("other")
         }],
         max_steps: 1000,
     }
@@ -60,15 +57,22 @@ pub(super) fn lying(x: f64, d_pct: f64) -> BodyEvidence {
     }
 }
 
+/// A target that nothing touches but what it lies on.
+fn untouched(x: f64, d_pct: f64) -> TargetEvidence {
+    TargetEvidence {
+        body: lying(x, d_pct),
+        pads: [PadEvidence::default(); 2],
+        hand_force_n: 0.0,
+        grip: GripEvidence { load_n: Vec3::zeros(), axis_w: Vec3::y(), dynamic_mu: 1.2 },
+        crushed: CrushedShares::default(),
+    }
+}
+
 /// One physics step with one target and one place.
 struct Step {
     hand_w: Vec3,
     gripper: GripperEvidence,
-    target: BodyEvidence,
-    pads: [PadEvidence; 2],
-    hand_force_n: f64,
-    grip: GripEvidence,
-    crushed: CrushedShares,
+    target: TargetEvidence,
     goal: PlaceEvidence,
 }
 
@@ -90,20 +94,16 @@ impl Replay {
             let mut step = Step {
                 hand_w: Vec3::new(-0.2, 0.0, 0.1),
                 gripper: GripperEvidence { width_m: 0.08, commanded_width_m: 0.08 },
-                target: lying(-0.2, 0.2),
-                pads: [PadEvidence::default(); 2],
-                hand_force_n: 0.0,
-                grip: GripEvidence { load_n: Vec3::zeros(), axis_w: Vec3::y(), dynamic_mu: 1.2 },
-                crushed: CrushedShares { collapsed: Some(0.02), damaged: None },
+                target: untouched(-0.2, 0.2),
                 goal: PlaceEvidence { pose_w: Pose::identity(), support_force_n: 0.0 },
             };
             make(&mut step);
-            let Step { hand_w, gripper, target, pads, hand_force_n, grip, crushed, goal } = step;
+            let Step { hand_w, gripper, target, goal } = step;
             self.judge.observe(&Evidence {
                 time_s: f64::from(self.step) * DT,
                 hand_w,
                 gripper,
-                targets: &[TargetEvidence { body: target, pads, hand_force_n, grip, crushed }],
+                targets: &[target],
                 others: &[self.other],
                 predicates: &[PredicateEvidence::Place(goal)],
             });
@@ -113,7 +113,7 @@ impl Replay {
     /// Grasped and carried at `x` with deformation `d_pct`.
     fn carry(&mut self, n: u32, x: f64, d_pct: f64) {
         self.steps(n, |e| {
-            e.target = BodyEvidence {
+            e.target.body = BodyEvidence {
                 centre_w: Vec3::new(x, 0.0, 0.13),
                 lowest_z_w: 0.1,
                 support_force_n: 0.0,
@@ -121,8 +121,18 @@ impl Replay {
                 deformation: Some(deformed(d_pct)),
             };
             e.hand_w = Vec3::new(x, 0.0, 0.2);
-            e.pads = [PadEvidence { normal_force_n: 1.2, slip_speed_m_s: 0.0 }; 2];
-            e.grip.load_n = Vec3::z() * WEIGHT_N;
+            e.target.pads = [PadEvidence { normal_force_n: 1.2, slip_speed_m_s: 0.0 }; 2];
+            e.target.grip.load_n = Vec3::z() * WEIGHT_N;
+            e.gripper = GripperEvidence { width_m: 0.05, commanded_width_m: 0.045 };
+        });
+    }
+
+    /// Carried over the plate by pads that press with a force (N) and slide at a speed (m/s).
+    fn grip(&mut self, n: u32, force_n: f64, slip_speed_m_s: f64) {
+        self.steps(n, |e| {
+            e.target.body = BodyEvidence { lowest_z_w: 0.1, support_force_n: 0.0, ..lying(0.0, 0.2) };
+            e.target.grip.load_n = Vec3::z() * WEIGHT_N;
+            e.target.pads = [PadEvidence { normal_force_n: force_n, slip_speed_m_s }; 2];
             e.gripper = GripperEvidence { width_m: 0.05, commanded_width_m: 0.045 };
         });
     }
@@ -130,7 +140,7 @@ impl Replay {
     /// Resting on the plate at `x`, hand open and away.
     fn rest(&mut self, n: u32, x: f64) {
         self.steps(n, |e| {
-            e.target = lying(x, 0.2);
+            e.target.body = lying(x, 0.2);
             e.goal.support_force_n = 0.6 * WEIGHT_N;
         });
     }
@@ -170,12 +180,7 @@ fn the_grip_is_judged_beside_safety() {
         let criteria = SuccessCriteria { require_no_slip, ..SuccessCriteria::default() };
         let mut replay = Replay::new(JudgeConfig { criteria, ..config() });
         replay.carry(1, 0.0, 0.2);
-        replay.steps(60, |e| {
-            e.target = BodyEvidence { lowest_z_w: 0.1, support_force_n: 0.0, ..lying(0.0, 0.2) };
-            e.grip.load_n = Vec3::z() * WEIGHT_N;
-            e.pads = [PadEvidence { normal_force_n: force_n, slip_speed_m_s: slip_m / (60.0 * DT) }; 2];
-            e.gripper = GripperEvidence { width_m: 0.05, commanded_width_m: 0.045 };
-        });
+        replay.grip(60, force_n, slip_m / (60.0 * DT));
         replay.rest(30, 0.0);
         replay.verdict(Outcome::Completed)
     };
@@ -196,12 +201,7 @@ fn the_grip_is_judged_beside_safety() {
 fn a_gentle_grip_reaches_the_goal_with_at_most_twice_the_least_force() {
     let gentle = |force_n: f64, goal: bool| {
         let mut replay = Replay::new(config());
-        replay.steps(60, |e| {
-            e.target = BodyEvidence { lowest_z_w: 0.1, support_force_n: 0.0, ..lying(0.0, 0.2) };
-            e.grip.load_n = Vec3::z() * WEIGHT_N;
-            e.pads = [PadEvidence { normal_force_n: force_n, slip_speed_m_s: 0.0 }; 2];
-            e.gripper = GripperEvidence { width_m: 0.05, commanded_width_m: 0.045 };
-        });
+        replay.grip(60, force_n, 0.0);
         replay.rest(if goal { 30 } else { 3 }, 0.0);
         replay.verdict(if goal { Outcome::Completed } else { Outcome::Budget }).gentle
     };
@@ -219,25 +219,14 @@ fn a_target_that_was_pushed_to_the_goal_has_no_contact_success() {
 }
 
 #[test]
-fn one_step_of_too_much_deformation_is_enough() {
-    let mut replay = Replay::new(config());
-    replay.carry(60, 0.0, 0.8);
-    replay.carry(1, 0.0, 1.000001);
-    replay.rest(30, 0.0);
-    let v = replay.verdict(Outcome::Completed);
-    assert!(v.goal && v.no_drop && !v.safety);
-    assert_eq!(v.object().deformation_ok, Some(false));
-}
-
-#[test]
 fn a_plate_that_carries_less_than_half_or_a_hand_that_touches_prevents_rest() {
     for (share, pad, case) in [(0.49, 0.0, 0.0), (0.6, 0.01, 0.0), (0.6, 0.0, 0.01)] {
         let mut replay = Replay::new(config());
         replay.steps(60, |e| {
-            e.target = lying(0.0, 0.2);
+            e.target.body = lying(0.0, 0.2);
             e.goal.support_force_n = share * WEIGHT_N;
-            e.pads[0].normal_force_n = pad;
-            e.hand_force_n = case;
+            e.target.pads[0].normal_force_n = pad;
+            e.target.hand_force_n = case;
         });
         let v = replay.verdict(Outcome::Budget);
         assert!(!v.goal && v.goal_v1 && v.no_drop && !v.safety, "{share} {pad} {case}");
@@ -254,7 +243,7 @@ fn in_a_basket_only_the_basket_carries() {
         let mut replay = inside();
         replay.steps(27, |e| {
             // It also rests on the table.
-            e.target = lying(0.0, 0.2);
+            e.target.body = lying(0.0, 0.2);
             e.goal.support_force_n = share * WEIGHT_N;
         });
         assert_eq!(replay.judge.is_goal_reached(), reached, "{share}");
@@ -286,73 +275,12 @@ fn lifting_the_other_instance_first_is_reported() {
 }
 
 #[test]
-fn missing_deformation_is_counted_and_not_safe() {
-    let mut replay = Replay::new(config());
-    replay.steps(1, |e| e.target.deformation = None);
-    replay.rest(30, 0.0);
-    let v = replay.verdict(Outcome::Completed);
-    assert!(v.goal && v.no_drop && !v.safety && !v.safety_known);
-    assert_eq!((v.object().deformation_ok, v.object().missing_deformation), (None, 1));
-}
-
-#[test]
-fn evidence_that_is_not_finite_is_counted_and_not_safe() {
-    let mut replay = Replay::new(config());
-    replay.steps(2, |e| e.target.centre_w.x = f64::NAN);
-    replay.rest(30, 0.0);
-    let v = replay.verdict(Outcome::Completed);
-    assert_eq!((v.missing_evidence, v.drop.unwrap().reason), (2, DropReason::NoEvidence));
-    assert!(!v.safety && !v.safety_known);
-}
-
-#[test]
-fn an_invalid_rollout_fails_and_leaves_safety_unknown() {
-    let mut replay = Replay::new(config());
-    replay.rest(60, 0.0);
-    let v = replay.verdict(Outcome::Invalid { reason: InvalidReason::Inverted, step: 60, node: Some(1) });
-    assert!(!v.goal && !v.goal_v1 && !v.no_drop && !v.safety && !v.safety_known);
-    assert_eq!(v.object().deformation_ok, None);
-}
-
-#[test]
-fn without_a_threshold_safety_is_unknown_unless_the_target_is_rigid() {
-    let mut replay =
-        Replay::new(JudgeConfig { targets: vec![Target { limit: None, ..target("bun") }], ..config() });
-    replay.rest(30, 0.0);
-    let v = replay.verdict(Outcome::Completed);
-    assert!(v.goal && !v.safety && !v.safety_known && v.object().tau.is_none() && v.kappas.is_empty());
-    let mut replay = Replay::new(JudgeConfig {
-        targets: vec![Target { limit: None, is_soft: false, ..target("cup") }],
-        ..config()
-    });
-    replay.rest(30, 0.0);
-    let v = replay.verdict(Outcome::Completed);
-    assert!(v.safety && v.safety_known);
-    assert_eq!((v.object().d_peak, v.object().deformation_ok), (None, None));
-}
-
-#[test]
-fn slip_is_reported_and_does_not_affect_safety() {
-    let mut replay = Replay::new(config());
-    replay.carry(10, 0.0, 0.5);
-    replay.steps(1, |e| {
-        e.target = BodyEvidence { lowest_z_w: 0.1, support_force_n: 0.0, ..lying(0.0, 0.5) };
-        e.pads = [PadEvidence { normal_force_n: 1.0, slip_speed_m_s: 0.0021 / DT }; 2];
-        e.gripper = GripperEvidence { width_m: 0.05, commanded_width_m: 0.045 };
-    });
-    replay.rest(30, 0.0);
-    let v = replay.verdict(Outcome::Completed);
-    assert!(!v.no_slip && (v.slip_mm - 2.1).abs() < 1e-9);
-    assert!(v.safety);
-}
-
-#[test]
 fn pads_that_slide_along_a_supported_object_do_not_slip() {
     let slip_mm = |support_force_n: f64| {
         let mut replay = Replay::new(config());
         replay.steps(1, |e| {
-            e.target = BodyEvidence { support_force_n, ..lying(0.0, 0.2) };
-            e.pads = [PadEvidence { normal_force_n: 1.0, slip_speed_m_s: 0.004 / DT }; 2];
+            e.target.body = BodyEvidence { support_force_n, ..lying(0.0, 0.2) };
+            e.target.pads = [PadEvidence { normal_force_n: 1.0, slip_speed_m_s: 0.004 / DT }; 2];
             e.gripper = GripperEvidence { width_m: 0.05, commanded_width_m: 0.045 };
         });
         replay.verdict(Outcome::Completed).slip_mm
@@ -404,7 +332,7 @@ fn a_goal_that_is_reached_without_contact_of_the_robot_is_marked() {
     let verdict = |is_touched: bool| {
         let mut replay = Replay::new(config());
         if is_touched {
-            replay.steps(1, |step| step.hand_force_n = 1.0);
+            replay.steps(1, |step| step.target.hand_force_n = 1.0);
         }
         replay.rest(30, 0.0);
         replay.verdict(Outcome::Completed)
@@ -426,7 +354,7 @@ fn the_series_of_deformation_is_summarised() {
     assert!((v.object().d_p95.unwrap() - 1.54).abs() < 1e-9 && v.object().d_peak == Some(1.6), "{v:?}");
     assert!((v.object().time_over_tau_s.unwrap() - 2.0 * DT).abs() < 1e-12, "τ is 1: {v:?}");
     let mut replay =
-        Replay::new(JudgeConfig { targets: vec![Target { limit: None, ..target("bun") }], ..config() });
+        Replay::new(JudgeConfig { targets: vec![JudgedBody { limit: None, ..target("bun") }], ..config() });
     replay.carry(3, 0.0, 0.4);
     assert_eq!(replay.verdict(Outcome::Budget).object().time_over_tau_s, None);
 }
@@ -451,15 +379,19 @@ fn a_failed_episode_names_its_stage() {
 fn the_crushed_volume_is_the_largest_over_the_episode_and_null_without_a_limit() {
     let mut replay = Replay::new(config());
     for share in [0.0, 0.08, 0.03] {
-        replay.steps(3, |e| e.crushed = CrushedShares { collapsed: Some(share), damaged: Some(0.5 * share) });
+        replay.steps(3, |e| {
+            e.target.crushed = CrushedShares { collapsed: Some(share), damaged: Some(0.5 * share) }
+        });
     }
     let verdict = replay.verdict(Outcome::Budget);
     assert_eq!(
         (verdict.object().collapsed_volume_pct, verdict.object().damaged_volume_pct),
         (Some(8.0), Some(4.0))
     );
-    let mut rigid =
-        Replay::new(JudgeConfig { targets: vec![Target { is_soft: false, ..target("cup") }], ..config() });
+    let mut rigid = Replay::new(JudgeConfig {
+        targets: vec![JudgedBody { is_soft: false, ..target("cup") }],
+        ..config()
+    });
     rigid.steps(3, |_| ());
     assert_eq!(rigid.verdict(Outcome::Budget).object().collapsed_volume_pct, None);
 }
@@ -467,14 +399,8 @@ fn the_crushed_volume_is_the_largest_over_the_episode_and_null_without_a_limit()
 /// Feeds `steps` physics steps with several targets that lie on the table or, by `at_place`, at their places.
 fn feed(judge: &mut Judge, steps: u32, at_place: &[bool], d_pct: &[f64], given: Option<bool>) {
     for _ in 0..steps {
-        let targets = at_place.iter().zip(d_pct).map(|(at_place, d_pct)| TargetEvidence {
-            body: lying(if *at_place { 0.0 } else { -0.2 }, *d_pct),
-            pads: [PadEvidence::default(); 2],
-            hand_force_n: 0.0,
-            grip: GripEvidence { load_n: Vec3::zeros(), axis_w: Vec3::y(), dynamic_mu: 1.2 },
-            crushed: CrushedShares::default(),
-        });
-        let targets: Vec<_> = targets.collect();
+        let places = at_place.iter().map(|at_place| if *at_place { 0.0 } else { -0.2 });
+        let targets: Vec<_> = places.zip(d_pct).map(|(x, d_pct)| untouched(x, *d_pct)).collect();
         let place = |at_place: &bool| PlaceEvidence {
             pose_w: Pose::identity(),
             support_force_n: if *at_place { WEIGHT_N } else { 0.0 },
@@ -602,18 +528,11 @@ fn a_goal_that_holds_in_the_settled_state_is_found() {
         let judge = Judge::new(two_targets(goal));
         let place =
             PredicateEvidence::Place(PlaceEvidence { pose_w: Pose::identity(), support_force_n: WEIGHT_N });
-        let lying = TargetEvidence {
-            body: lying(0.0, 0.0),
-            pads: [PadEvidence::default(); 2],
-            hand_force_n: 0.0,
-            grip: GripEvidence { load_n: Vec3::zeros(), axis_w: Vec3::y(), dynamic_mu: 1.2 },
-            crushed: CrushedShares::default(),
-        };
         judge.holds_at_start(&Evidence {
             time_s: 0.0,
             hand_w: Vec3::zeros(),
             gripper: GripperEvidence { width_m: 0.08, commanded_width_m: 0.08 },
-            targets: &[lying; 2],
+            targets: &[untouched(0.0, 0.0); 2],
             others: &[],
             predicates: &[place, place, PredicateEvidence::Given(given)],
         })

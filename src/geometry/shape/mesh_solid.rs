@@ -27,7 +27,7 @@ pub struct MeshSolid {
 /// The point of a mesh nearest to a point of space.
 #[derive(Clone, Copy, Debug)]
 pub struct MeshPoint<'a> {
-    /// The mesh.
+    /// The mesh on which the point lies.
     pub solid: &'a MeshSolid,
     /// Index of the triangle.
     pub triangle: usize,

@@ -9,11 +9,11 @@ use crate::{Mat3, Vec3};
 /// Its serialised names are part of fingerprints of assets.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 pub enum Axis {
-    /// The x axis.
+    /// Axis x of the frame of the shape.
     X,
-    /// The y axis.
+    /// Axis y of the frame of the shape.
     Y,
-    /// The z axis.
+    /// Axis z of the frame of the shape.
     Z,
 }
 

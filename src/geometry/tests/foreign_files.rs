@@ -271,14 +271,14 @@ fn a_closed_mesh_keeps_vertices_that_are_close() {
 }
 
 #[test]
-fn y_is_up_in_glb_files_and_z_in_others_unless_stated() {
+fn scale_is_applied_and_y_is_up_in_glb_files_and_z_in_others_unless_stated() {
     let text = CUBE.replace("v 0 0 1", "v 0 0 3").replace("v 1 0 1", "v 1 0 3").replace("v 1 1 1", "v 1 1 3");
     let brick = read_obj(&text.replace("v 0 1 1", "v 0 1 3")).expect("a brick");
     let glb = Glb::new(&brick).bytes();
     let size = |bytes: &[u8], format, z_up| {
-        let mesh = import(bytes, format, &MeshImportOptions { scale: 1.0, z_up }).expect("a brick");
+        let mesh = import(bytes, format, &MeshImportOptions { scale: 0.125, z_up }).expect("a brick");
         assert!(mesh.volume() > 0.0);
-        Aabb::from_points(&mesh.vertices).expect("corners").size()
+        Aabb::from_points(&mesh.vertices).expect("corners").size() / 0.125
     };
     let (tall, lying) = (Vec3::new(1.0, 1.0, 3.0), Vec3::new(1.0, 3.0, 1.0));
     assert_eq!(

@@ -39,7 +39,7 @@ fn materials(colours: Result<ImportedColours, String>) -> Result<String, String>
     Ok(lines.collect::<Vec<_>>().join("\n"))
 }
 
-/// A cube with a material and an image beside the file.
+/// A cube with a material and an image in a file of its own.
 fn textured() -> Glb {
     let materials = "\"materials\":[{\"pbrMetallicRoughness\":{\"baseColorTexture\":{\"index\":0,\"texCoord\":0}}}],\
                      \"textures\":[{\"source\":0}],\"images\":[{\"uri\":\"a.png\"}],\"accessors\"";

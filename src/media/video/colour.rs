@@ -35,7 +35,6 @@ pub(super) fn to_yuv(rgb: &[u8], frame: &mut YuvFrame) {
     }
 }
 
-/// Converts a frame back to RGB, repeating chroma.
 #[cfg(test)]
 pub(super) fn to_rgb(frame: &YuvFrame) -> Vec<u8> {
     let half = frame.width / 2;

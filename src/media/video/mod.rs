@@ -18,23 +18,17 @@ const QUANTISER: u8 = 22;
 /// Frames between two key frames, at which playback can start.
 const KEY_INTERVAL: u32 = 40;
 
-/// Error of encoding or writing a video.
-#[allow(missing_docs)] // The messages say what the fields are.
 #[derive(Debug, Error)]
 pub enum VideoError {
     /// The size cannot be encoded: chroma is stored at half the resolution.
     #[error("a video of {0} × {1} pixels cannot be encoded: both must be even, from 16 to 4096")]
     Size(usize, usize),
-    /// An image does not have the size of the video.
     #[error("an image of {got} bytes in a video of {width} × {height}: expected {expected}")]
     ImageSize { got: usize, expected: usize, width: usize, height: usize },
-    /// H.264 encoding failed.
     #[error("the encoder failed: {0:?}")]
     Encoder(EncodeError),
-    /// No frame was added.
     #[error("the video has no frames")]
     Empty,
-    /// The file cannot be written.
     #[error(transparent)]
     File(#[from] FileError),
 }
@@ -48,9 +42,6 @@ pub struct VideoWriter {
 
 impl VideoWriter {
     /// Starts a video of `width × height` pixels at `rate` frames per second.
-    ///
-    /// # Errors
-    /// [`VideoError::Size`] for odd or extreme sizes.
     pub fn new(width: usize, height: usize, rate: u32) -> Result<Self, VideoError> {
         let fits = |size: usize| size.is_multiple_of(2) && (16..=4096).contains(&size);
         if !fits(width) || !fits(height) {
@@ -88,9 +79,6 @@ impl VideoWriter {
     }
 
     /// The bytes of the file.
-    ///
-    /// # Errors
-    /// [`VideoError::Empty`] if there are no frames.
     pub fn finish(self) -> Result<Vec<u8>, VideoError> {
         if self.track.len() == 0 { Err(VideoError::Empty) } else { Ok(self.track.file()) }
     }

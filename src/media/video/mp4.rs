@@ -7,13 +7,11 @@
 /// Clock ticks per frame.
 const TICKS: u32 = 1000;
 
-/// An encoded frame.
 struct Sample {
     bytes: Vec<u8>,
     is_key: bool,
 }
 
-/// A video track in memory.
 pub(super) struct Track {
     width: usize,
     height: usize,
@@ -29,7 +27,6 @@ impl Track {
         Self { width, height, rate, sps: Vec::new(), pps: Vec::new(), samples: Vec::new() }
     }
 
-    /// Number of frames.
     pub(super) fn len(&self) -> usize {
         self.samples.len()
     }
@@ -52,7 +49,6 @@ impl Track {
         self.samples.push(sample);
     }
 
-    /// The bytes of the file.
     pub(super) fn file(&self) -> Vec<u8> {
         let brands = b"isomiso2avc1mp41";
         let mut file = mp4_box(b"ftyp", &[b"isom".as_slice(), &512_u32.to_be_bytes(), brands].concat());
@@ -133,7 +129,6 @@ fn mp4_box(name: &[u8; 4], payload: &[u8]) -> Vec<u8> {
     [&(payload.len() as u32 + 8).to_be_bytes(), name.as_slice(), payload].concat()
 }
 
-/// Big-endian fields.
 struct BoxFields(Vec<u8>);
 
 impl BoxFields {
@@ -171,12 +166,9 @@ fn nal_units(stream: &[u8]) -> impl Iterator<Item = &[u8]> {
     units.filter(|unit| !unit.is_empty())
 }
 
-/// Length and frame rate of a video.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct VideoInfo {
-    /// Number of frames.
     pub frames: usize,
-    /// Frames per second.
     pub frame_rate: f64,
 }
 
@@ -197,7 +189,6 @@ impl VideoInfo {
     }
 }
 
-/// Payload of the first box of this name.
 fn find_box<'a>(mut boxes: &'a [u8], name: &[u8; 4]) -> Option<&'a [u8]> {
     loop {
         let size = read_u32(boxes, 0)? as usize;

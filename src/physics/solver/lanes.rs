@@ -118,8 +118,10 @@ pub(super) struct PointPack {
     pub(super) stiffness: f64x4,
     /// Tangential stiffness, N/m.
     pub(super) shear_stiffness: f64x4,
-    /// Bound on the friction impulse, N s.
+    /// Bound on the friction impulse, N s; infinite for bonded points.
     pub(super) friction_bound: f64x4,
+    /// Depth below which the normal spring exerts no force, m: 0, or −∞ for bonded points, which also pull.
+    pub(super) least_depth: f64x4,
 }
 
 impl PointPack {
@@ -146,6 +148,7 @@ impl PointPack {
             stiffness: lanes(points, 0.0, |point| point.stiffness),
             shear_stiffness: lanes(points, 0.0, |point| point.shear_stiffness),
             friction_bound: friction_bound(points),
+            least_depth: lanes(points, 0.0, |point| if point.is_bonded { f64::NEG_INFINITY } else { 0.0 }),
         }
     }
 
@@ -156,7 +159,11 @@ impl PointPack {
 }
 
 fn friction_bound(points: &[ContactPoint]) -> f64x4 {
-    lanes(points, 0.0, |point| point.mu * point.previous_normal_impulse)
+    let bound = |point: &ContactPoint| match point.is_bonded {
+        true => f64::INFINITY,
+        false => point.mu * point.previous_normal_impulse,
+    };
+    lanes(points, 0.0, bound)
 }
 
 /// A value per point; `empty` in lanes without one.

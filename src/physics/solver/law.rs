@@ -44,13 +44,14 @@ impl ContactLaw {
     /// in the previous pass.
     ///
     /// Normal: the spring at the end of the step with dissipation, `γ = dt k (−gap − (dt + τ) v_n)₊`. Tangent: with
-    /// `z = s + (dt + τ) v_t` the spring `−dt k_t z`, cut off at the lagged bound `μ γ_n` (a Huber cost in `z`).
+    /// `z = s + (dt + τ) v_t` the spring `−dt k_t z`, cut off at the lagged bound `μ γ_n` (a Huber cost in `z`). Bonded
+    /// points have the same springs without the cut-offs.
     #[inline(always)]
     pub(super) fn contact(&self, points: &PointPack, v: Vec3x4) -> Option<ContactResponse> {
         let [dt, dt_plus_tau, inverse] = [self.dt, self.dt_plus_tau, self.inverse].map(f64x4::splat);
         let (n, bound) = (points.normal, points.friction_bound);
         let vn = n.dot(v);
-        let depth = (-points.gap - dt_plus_tau * vn).fast_max(f64x4::ZERO);
+        let depth = (-points.gap - dt_plus_tau * vn).fast_max(points.least_depth);
         let is_bound = bound.simd_gt(f64x4::ZERO);
         if !(depth.simd_gt(f64x4::ZERO) | is_bound).any() {
             return None;
@@ -93,7 +94,8 @@ impl ContactLaw {
         lane: usize,
     ) -> Option<Mat3> {
         let of = |lanes: f64x4| lanes.to_array()[lane];
-        let (is_pressed, bound) = (of(response.normal) > 0.0, of(points.friction_bound));
+        let bound = of(points.friction_bound);
+        let is_pressed = of(response.normal) > 0.0 || bound.is_infinite();
         if !is_pressed && bound <= 0.0 {
             return None;
         }
@@ -123,7 +125,7 @@ impl ContactLaw {
 pub(super) enum LinearSegment {
     /// At the smallest force.
     Lower,
-    /// Between the limits.
+    /// Between the limits, linear in the velocity.
     Linear,
     /// At the largest force.
     Upper,
@@ -200,18 +202,21 @@ mod tests {
         #[test]
         fn impulse_is_minus_the_gradient_and_curvature_its_derivative(
             v in prop::array::uniform3(-0.1f64..0.1), gap in -1e-3f64..1e-3, offset in prop::array::uniform2(-1e-3f64..1e-3),
-            previous_normal_impulse in 0.0f64..5e-3,
+            previous_normal_impulse in 0.0f64..5e-3, is_bonded: bool,
         ) {
             let (law, v) = (ContactLaw::new(1.0 / 60.0, 0.01), Vec3::from(v));
             let separated = point(1.0, [0.0; 2], 0.0);
             // The second of three points; the fourth lane is empty.
-            let (lane, pack) = (1, PointPack::new(&[separated, point(gap, offset, previous_normal_impulse), separated], [4, 0]));
+            let touching = ContactPoint { is_bonded, ..point(gap, offset, previous_normal_impulse) };
+            let (lane, pack) = (1, PointPack::new(&[separated, touching, separated], [4, 0]));
             let response = |v: &Vec3| law.contact(&pack, Vec3x4::splat(v)).unwrap_or_default();
             let at = response(&v);
             for other in [0, 2, 3] {
                 let impulse = at.impulse.lane(other);
                 prop_assert!(impulse == Vec3::zeros() && at.cost.to_array()[other] == 0.0, "{at:?}");
             }
+            let spring = 250.0 / 60.0 * (Vec3::new(offset[0], offset[1], 2.0 * gap) + v.component_mul(&Vec3::new(1.0, 1.0, 2.0)) * law.dt_plus_tau);
+            prop_assert!(!is_bonded || (at.impulse.lane(lane) + spring).norm() < 1e-12, "{at:?}");
             let curvature = law.curvature(&pack, &at, lane).unwrap_or_default();
             let cost = |response: &ContactResponse| response.cost.to_array()[lane];
             let kind = |response: &ContactResponse| {

@@ -307,8 +307,10 @@ impl Solver {
                 let (normals, slipping) = (response.normal.to_array(), response.is_slipping.to_bitmask());
                 for (lane, point) in points.iter_mut().enumerate() {
                     let normal = normals[lane];
-                    impulses.change += (normal - point.previous_normal_impulse).abs();
-                    impulses.total += normal;
+                    if !point.is_bonded {
+                        impulses.change += (normal - point.previous_normal_impulse).abs();
+                        impulses.total += normal;
+                    }
                     point.normal_impulse = normal;
                     point.shear_impulse = response.impulse.lane(lane) - point.normal * normal;
                     point.is_slipping = slipping >> lane & 1 == 1;

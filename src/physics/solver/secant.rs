@@ -16,7 +16,7 @@ struct SecantPair {
 /// Number of pairs kept per factor. Their cost is small against the triangular solves of islands that take many steps.
 const MAX_PAIRS: usize = 20;
 
-/// The last pairs.
+/// The last [`MAX_PAIRS`] pairs of a change of velocity and of gradient.
 #[derive(Clone, Debug, Default)]
 pub(super) struct SecantPairs {
     /// Oldest first; beyond `used`, buffers of discarded pairs.

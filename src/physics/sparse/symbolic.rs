@@ -45,7 +45,7 @@ pub(super) struct Run {
     pub from: usize,
     /// First row in the parent.
     pub to: usize,
-    /// Number of rows.
+    /// Number of rows of the run.
     pub len: usize,
 }
 

@@ -31,6 +31,8 @@ pub(super) struct BlockMap {
     /// Rigid part of the motion of each soft body that is solved for its deviation from it; see
     /// [`World::add_soft_blocks`].
     pub rigid_parts: Vec<Option<RigidVelocity>>,
+    /// Rigid motion of each assembly in flight, whose bodies are solved for their deviations from it.
+    pub flights: Vec<Option<RigidVelocity>>,
     pub rigid: Vec<Option<usize>>,
     pub articulations: Vec<Option<usize>>,
     /// Torque-free rotation of each rigid body in this step.
@@ -43,6 +45,11 @@ pub(super) struct BlockMap {
 impl BlockMap {
     pub(super) fn soft(&self, id: SoftId) -> Option<usize> {
         self.soft[id.index()]
+    }
+
+    /// Rigid motion of the flight of an assembly.
+    pub(super) fn flight(&self, assembly: Option<usize>) -> Option<RigidVelocity> {
+        self.flights[assembly?]
     }
 }
 
@@ -98,12 +105,15 @@ impl World {
         self.problem.clear(self.params.dt, self.params.dissipation_time);
         self.rows.clear();
         self.blocks.frames.clear();
+        self.find_rigid_pairs();
+        self.find_flights();
         self.add_soft_blocks()?;
         self.add_rigid_blocks();
         self.add_articulation_blocks();
         self.add_soft_collider_contacts();
         self.add_soft_soft_contacts();
         self.add_rigid_contacts();
+        self.add_bonds();
         Ok(())
     }
 
@@ -113,7 +123,9 @@ impl World {
     /// a strained body it acts as a brake. So a body without contact is solved for its deviation `w = v − v_r` from the
     /// rigid motion `v_r` with the momenta of `b`: `A w = b − (1 + α dt) M v_r`. What momenta `w` still has through `K`
     /// are removed ([`World::integrate`]), so linear and angular momentum are exact for any strain and any age of the
-    /// factor. In contact, the brake is a force that the contacts balance, and that is zero at rest.
+    /// factor. Bodies that are attached to each other, and otherwise touch nothing, are solved for their deviations
+    /// from a common rigid motion. In contact, the brake is a force that the contacts balance, and that is zero at
+    /// rest.
     fn add_soft_blocks(&mut self) -> Result<(), StepFailure> {
         let c = StepCoefficients {
             dt: self.params.dt,
@@ -138,16 +150,20 @@ impl World {
                 (0..body.x.len())
                     .map(|n| (body.v[n] + self.gravity * c.dt) * body.model.mass[n] + body.force[n] * c.dt),
             );
-            let is_free = !self.candidates.involves(SoftId::new(index));
-            let rigid_part = is_free.then(|| {
-                let damping = 1.0 + c.rayleigh_mass * c.dt;
-                let undamped = momentum.iter().map(|p| p / damping);
-                let rigid = RigidVelocity::with_momenta(body, undamped);
+            let damping = 1.0 + c.rayleigh_mass * c.dt;
+            let rigid_part = match soft.assembly {
+                Some(assembly) => self.blocks.flights[assembly],
+                None if self.candidates.involves(SoftId::new(index)) => None,
+                None => {
+                    let undamped = momentum.iter().map(|p| p / damping);
+                    Some(RigidVelocity::with_momenta(body, undamped))
+                }
+            };
+            if let Some(rigid) = &rigid_part {
                 for ((p, x), m) in momentum.iter_mut().zip(&body.x).zip(&body.model.mass) {
                     *p -= rigid.at(x) * (damping * m);
                 }
-                rigid
-            });
+            }
             let dim = 3 * soft.system.retained().len();
             let id = BodyId::Soft(SoftId::new(index));
             let identity = BlockIdentity { body: id, version: soft.system.retained_version() };
@@ -185,15 +201,23 @@ impl World {
             for (r, c) in (0..9).map(|e| (e % 3, e / 3)) {
                 matrix[(3 + c) * 6 + 3 + r] = inertia[(r, c)];
             }
-            let linear = (body.v + self.gravity * dt) * body.mass;
-            let angular = inertia * spin.end_w;
+            // In flight, the common rotation of the bodies includes that of this one without torque.
+            let (v, w, end_w) = match self.blocks.flight(rigid.assembly) {
+                Some(flight) => {
+                    let w = body.w - flight.angular;
+                    (body.v - flight.at(&body.pose_w.translation.vector), w, w)
+                }
+                None => (body.v, body.w, spin.end_w),
+            };
+            let linear = (v + self.gravity * dt) * body.mass;
+            let angular = inertia * end_w;
             let stack = |a: &Vec3, b: &Vec3| [a.as_slice(), b.as_slice()].concat();
             self.blocks.rigid.push(Some(self.problem.blocks.len()));
             self.problem.blocks.push(VelocityBlock {
                 dim: 6,
                 matrix,
                 rhs: stack(&linear, &angular),
-                v: stack(&body.v, &body.w),
+                v: stack(&v, &w),
                 identity: BlockIdentity { body: BodyId::Rigid(RigidId::new(index)), version: 0 },
                 ..VelocityBlock::default()
             });

@@ -38,6 +38,7 @@ impl World {
             friction,
             stiffness: SurfaceStiffness { normal: modulus, shear: self.params.shear_ratio * modulus },
             surface,
+            assembly: None,
             sleep: SleepState::default(),
             contacts: Vec::new(),
             system: VelocitySystem::new(&model),
@@ -53,6 +54,7 @@ impl World {
         self.rigid.push(RigidBody {
             name: name.to_owned(),
             state,
+            assembly: None,
             sleep: SleepState::default(),
             contacts: Vec::new(),
         });
@@ -82,6 +84,7 @@ impl World {
             drives,
             drive_forces: vec![0.0; joints],
             has_gravity,
+            assembly: None,
             sleep: SleepState::default(),
             friction: q.iter().map(|&anchor| JointFriction { anchor, stiffness: 0.0 }).collect(),
             poses,
@@ -106,12 +109,21 @@ impl World {
         self.kinematic[id.index()] = KinematicFrame { pose, next: pose };
     }
 
-    /// Adds a collider.
+    /// Adds a collider to its parent, and returns its identity.
     ///
     /// # Panics
     /// The collider's parent is a soft body, whose surface is that of its mesh, or is not in this world.
     pub fn add_collider(&mut self, collider: Collider) -> ColliderId {
-        let is_here = match collider.parent {
+        let can_carry = self.has_solid(collider.parent);
+        assert!(can_carry, "collider {}: {:?} cannot carry it", collider.name, collider.parent);
+        self.wake_all();
+        self.colliders.push(collider);
+        ColliderId::new(self.colliders.len() - 1)
+    }
+
+    /// True if a body is in this world and not soft.
+    pub(super) fn has_solid(&self, body: BodyId) -> bool {
+        match body {
             BodyId::World => true,
             BodyId::Kinematic(id) => id.index() < self.kinematic.len(),
             BodyId::Rigid(id) => id.index() < self.rigid.len(),
@@ -120,11 +132,7 @@ impl World {
                 articulation.is_some_and(|articulation| id.index < articulation.tree.dofs())
             }
             BodyId::Soft(_) => false,
-        };
-        assert!(is_here, "collider {}: {:?} cannot carry it", collider.name, collider.parent);
-        self.wake_all();
-        self.colliders.push(collider);
-        ColliderId::new(self.colliders.len() - 1)
+        }
     }
 
     /// Adds a nearly rigid collider of `shape` at `pose_in_parent` on `parent`.

@@ -34,6 +34,8 @@
 //! ```
 
 mod assemble;
+mod assembly;
+mod attachment;
 mod build;
 mod builders;
 mod contact_points;
@@ -48,12 +50,16 @@ mod state;
 
 use crate::{
     contact::{Collider, ColliderMotion, DetectionLimits},
-    ids::{ArticulationId, BodyId, ColliderId, ContactPartner, KinematicId, LinkId, RigidId, SoftId},
+    ids::{
+        ArticulationId, AttachmentId, BodyId, ColliderId, ContactPartner, KinematicId, LinkId, RigidId,
+        SoftId,
+    },
     params::PhysicsParams,
     solver::{ContactProblem, Solver, SolverStats},
 };
 use softvt_geometry::{GroupedAabb, Pose, Vec3};
 
+pub use attachment::{AttachError, Attachment};
 pub use builders::{BodyBuilder, FixedBuilder, KinematicBuilder, RigidBodyBuilder, SoftBodyBuilder};
 pub use penetration::Penetration;
 pub use snapshot::{ContactPatch, Energy, PatchPoint, SampleSupport, WorldSnapshot};
@@ -162,6 +168,8 @@ pub struct World {
     articulations: Vec<Articulation>,
     kinematic: Vec<KinematicFrame>,
     colliders: Vec<Collider>,
+    attachments: Vec<Attachment>,
+    assemblies: Vec<assembly::Assembly>,
     stats: SolverStats,
     // Data of the current step, in buffers that are reused.
     motions: Vec<ColliderMotion>,
@@ -213,12 +221,14 @@ impl World {
         self.wake_disturbed();
         self.detect_soft_collider();
         self.detect_soft_soft();
+        self.mark_attached();
         self.assemble()?;
         let solved = self.solver.solve(&mut self.problem);
         self.stats = solved
             .map_err(|f| StepFailure::Diverged { step: self.step, residual_ratio: f.residual_ratio })?;
         self.integrate();
         self.record_contacts();
+        self.record_bonds();
         self.update_soft_history();
         self.update_rigid_history();
         self.put_resting_to_sleep();
@@ -343,6 +353,11 @@ impl World {
     /// The collider with this id.
     pub fn collider(&self, id: ColliderId) -> &Collider {
         &self.colliders[id.index()]
+    }
+
+    /// The attachment with this id.
+    pub fn attachment(&self, id: AttachmentId) -> &Attachment {
+        &self.attachments[id.index()]
     }
 
     /// Name of a collider or soft body.

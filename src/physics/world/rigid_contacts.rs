@@ -71,7 +71,7 @@ pub(super) struct ColliderPair {
 /// Contacts between colliders: state between steps, and rows and buffers of the current one.
 #[derive(Clone, Debug, Default)]
 pub(super) struct RigidContacts {
-    /// Ascending by key.
+    /// States of the points, ascending by key.
     states: Vec<PointState>,
     /// In the order of their points, which follow those of soft bodies.
     rows: Vec<RigidRow>,
@@ -89,11 +89,17 @@ pub(super) struct PressingPoint<'a> {
 }
 
 impl World {
+    /// Finds the pairs of colliders of this step that may touch.
+    pub(super) fn find_rigid_pairs(&mut self) {
+        let mut pairs = std::mem::take(&mut self.rigid_contacts.pairs);
+        self.near_pairs(&mut pairs);
+        self.rigid_contacts.pairs = pairs;
+    }
+
     /// Adds the contacts of all pairs of colliders near each other to the problem.
     pub(super) fn add_rigid_contacts(&mut self) {
         let mut contacts = std::mem::take(&mut self.rigid_contacts);
         contacts.rows.clear();
-        self.near_pairs(&mut contacts.pairs);
         for &ColliderPair { a, b, margin } in &contacts.pairs {
             let (first, second) = (self.collider(a), self.collider(b));
             let (Some(solid_a), Some(solid_b)) = (&first.collision_geometry, &second.collision_geometry)
@@ -227,6 +233,11 @@ impl World {
 }
 
 impl RigidContacts {
+    /// The pairs of colliders that may touch in this step.
+    pub(super) fn pairs(&self) -> &[ColliderPair] {
+        &self.pairs
+    }
+
     /// The solved points that press; `solved` are the problem's points between colliders.
     pub(super) fn pressing<'a>(
         &'a self,

@@ -1,7 +1,7 @@
 //! Sleep: a body at rest costs nothing until something near it moves or anything is changed.
 
-use super::{World, assemble::RETAIN_DISTANCE};
-use crate::ids::{BodyId, ColliderId, SoftId};
+use super::{RigidBody, World, assemble::RETAIN_DISTANCE};
+use crate::ids::{ArticulationId, BodyId, ColliderId, LinkId, SoftId};
 use softvt_geometry::{Aabb, GroupedAabb, Vec3};
 
 impl World {
@@ -47,6 +47,7 @@ impl World {
             }
         }
         self.moving = moving;
+        self.wake_assemblies();
         let mut resting = std::mem::take(&mut self.resting);
         resting.retain(|(collider, point)| self.are_resting(*collider, point.partner));
         self.resting = resting;
@@ -81,28 +82,60 @@ impl World {
         for id in self.soft_ids() {
             let soft = &mut self.soft[id.index()];
             let is_due = soft.sleep.is_due(soft.state.max_speed(), &self.params);
-            if is_due && self.rows.iter().any(|row| row.soft == id || row.partner == id.into()) {
-                let soft = &mut self.soft[id.index()];
-                soft.sleep.is_asleep = true;
-                soft.state.v.iter_mut().for_each(|v| *v = Vec3::zeros());
+            if is_due && soft.assembly.is_none() && self.touches(id.into()) {
+                self.put_to_sleep(id.into());
             }
         }
         for id in self.rigid_ids() {
             let rigid = &mut self.rigid[id.index()];
             let speed = rigid.state.v.norm() + rigid.state.w.norm();
-            if rigid.sleep.is_due(speed, &self.params) && self.is_touching(id) {
-                let rigid = &mut self.rigid[id.index()];
-                rigid.sleep.is_asleep = true;
-                (rigid.state.v, rigid.state.w) = (Vec3::zeros(), Vec3::zeros());
+            let is_due = rigid.sleep.is_due(speed, &self.params);
+            if is_due && rigid.assembly.is_none() && self.touches(id.into()) {
+                self.put_to_sleep(id.into());
             }
         }
-        for articulation in self.articulations.iter_mut().filter(|articulation| !articulation.is_driven()) {
-            if articulation.sleep.is_due(articulation.state.v.amax(), &self.params) {
-                articulation.sleep.is_asleep = true;
-                articulation.state.v.fill(0.0);
+        for index in 0..self.articulations.len() {
+            let articulation = &mut self.articulations[index];
+            let is_due = !articulation.is_driven()
+                && articulation.sleep.is_due(articulation.state.v.amax(), &self.params);
+            if is_due && articulation.assembly.is_none() {
+                self.put_to_sleep(LinkId { articulation: ArticulationId::new(index), index: 0 }.into());
             }
         }
+        self.put_assemblies_to_sleep();
         let fallen = self.solved_points(|collider, partner| self.are_resting(collider, partner));
         self.resting.extend(fallen);
+    }
+
+    /// True if a soft or rigid body touched anything in the last step.
+    pub(super) fn touches(&self, body: BodyId) -> bool {
+        match body {
+            BodyId::Soft(id) => self.rows.iter().any(|row| row.soft == id || row.partner == id.into()),
+            BodyId::Rigid(id) => self.is_touching(id),
+            BodyId::World | BodyId::Kinematic(_) | BodyId::Link(_) => false,
+        }
+    }
+
+    /// Puts a body, or the articulation of a link, to sleep.
+    pub(super) fn put_to_sleep(&mut self, body: BodyId) {
+        let sleep = match body {
+            BodyId::Soft(id) => {
+                let soft = &mut self.soft[id.index()];
+                soft.state.v.fill(Vec3::zeros());
+                &mut soft.sleep
+            }
+            BodyId::Rigid(id) => {
+                let RigidBody { state, sleep, .. } = &mut self.rigid[id.index()];
+                (state.v, state.w) = (Vec3::zeros(), Vec3::zeros());
+                sleep
+            }
+            BodyId::Link(id) => {
+                let articulation = &mut self.articulations[id.articulation.index()];
+                articulation.state.v.fill(0.0);
+                &mut articulation.sleep
+            }
+            BodyId::World | BodyId::Kinematic(_) => return,
+        };
+        sleep.is_asleep = true;
     }
 }

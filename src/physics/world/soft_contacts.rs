@@ -25,7 +25,13 @@ pub(super) struct Candidates {
 impl Candidates {
     /// True if a soft body may touch anything in this step.
     pub(super) fn involves(&self, id: SoftId) -> bool {
-        self.collider.iter().any(|c| c.soft == id) || self.soft.iter().any(|c| c.soft == id || c.other == id)
+        self.pairs().any(|(soft, partner)| soft == id || partner == id.into())
+    }
+
+    /// The pairs of surfaces that may touch in this step, once per point.
+    pub(super) fn pairs(&self) -> impl Iterator<Item = (SoftId, ContactPartner)> {
+        let with_colliders = self.collider.iter().map(|c| (c.soft, c.collider.into()));
+        with_colliders.chain(self.soft.iter().map(|c| (c.soft, c.other.into())))
     }
 }
 
@@ -76,6 +82,7 @@ impl World {
         self.candidates.collider.clear();
         let limits = self.detection_limits();
         let (mut found, mut bounds) = (Vec::new(), BodyBounds::default());
+        let attachments = &self.attachments;
         for (index, soft) in self.soft.iter_mut().enumerate().filter(|(_, s)| !s.sleep.is_asleep) {
             soft.steps_awake += 1;
             let (system, body, step) = (&mut soft.system, &soft.state, soft.steps_awake);
@@ -87,8 +94,11 @@ impl World {
                     group.nodes[..group.count].iter().for_each(|&node| system.mark(node, step));
                 };
                 detect(body, &bounds, collider, motion, limits, &mut found, &mut mark);
+                let (soft, parent) = (SoftId::new(index), collider.parent);
+                let attached = attachments.iter().filter(|to| to.is_between(soft, parent));
+                attached.for_each(|to| found.retain(|candidate| !to.has_group(candidate.group)));
                 found.iter().for_each(|candidate| mark(candidate.group));
-                let (soft, collider) = (SoftId::new(index), ColliderId::new(id));
+                let collider = ColliderId::new(id);
                 let found =
                     found.iter().map(|&candidate| SoftColliderCandidate { soft, collider, candidate });
                 self.candidates.collider.extend(found);

@@ -61,7 +61,7 @@ impl ContactSummary {
 /// Contact of a body with one partner.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BodyContact {
-    /// The other side.
+    /// The collider or soft body on the other side.
     pub partner: ContactPartner,
     /// Sums over the contact points, as seen by the body.
     pub summary: ContactSummary,
@@ -79,6 +79,8 @@ pub struct SoftBody {
     /// Contact stiffness of its surface.
     pub stiffness: SurfaceStiffness,
     pub(super) surface: Option<Arc<dyn ContactSurface>>,
+    /// Index of the assembly to which it belongs.
+    pub(super) assembly: Option<usize>,
     pub(super) sleep: SleepState,
     pub(super) contacts: Vec<BodyContact>,
     /// Factored velocity system, reduced to the nodes in contact.
@@ -108,6 +110,8 @@ pub struct RigidBody {
     pub name: String,
     /// Pose, velocity and mass properties. Pose and velocity may be set between steps.
     pub state: RigidState,
+    /// Index of the assembly to which it belongs.
+    pub(super) assembly: Option<usize>,
     pub(super) sleep: SleepState,
     pub(super) contacts: Vec<BodyContact>,
 }
@@ -193,13 +197,15 @@ pub struct Articulation {
     pub(super) drives: Vec<Option<JointDrive>>,
     pub(super) drive_forces: Vec<f64>,
     pub(super) has_gravity: bool,
+    /// Index of the assembly to which its links belong.
+    pub(super) assembly: Option<usize>,
     pub(super) sleep: SleepState,
     pub(super) friction: Vec<JointFriction>,
     pub(super) poses: Vec<Pose>,
 }
 
 impl Articulation {
-    /// The mechanism.
+    /// Links and joints of the mechanism.
     pub fn tree(&self) -> &JointTree {
         &self.tree
     }

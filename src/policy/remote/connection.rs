@@ -1,6 +1,7 @@
 //! A connection to a policy server. Every wait ends at a deadline or when the run is cancelled, whatever arrives.
 
 use std::{
+    fmt::Display,
     io::{self, ErrorKind},
     net::{TcpStream, ToSocketAddrs},
     sync::mpsc::{self, RecvTimeoutError},
@@ -10,23 +11,23 @@ use std::{
 
 use rmpv::Value;
 use tungstenite::{
-    ClientRequestBuilder, Error, Message, WebSocket, client, error::ProtocolError, http::Uri,
-    protocol::frame::coding::CloseCode,
+    ClientRequestBuilder, Error, HandshakeError, Message, WebSocket, client,
+    error::ProtocolError,
+    http::Uri,
+    protocol::{CloseFrame, frame::coding::CloseCode},
 };
 
 use softvt_common::cancel::CancelFlag;
 
 use crate::{
     PolicyError,
-    msgpack::unpack,
+    msgpack::{pack, unpack},
     profile::Profile,
-    transport::{
-        self, POLL_INTERVAL, PollingStream, TransportError, complete_handshake, websocket_config, would_block,
-    },
+    transport::{POLL_INTERVAL, TimedStream, is_timeout, websocket_config},
 };
 
 /// Longest message that is accepted; an action chunk is about 10 kB.
-const MAX_MESSAGE_BYTES: usize = 64 << 20;
+const MAX_MESSAGE_BYTES: usize = 8 << 20;
 /// Pause before the second attempt to connect; it doubles with every further attempt.
 const FIRST_PAUSE: Duration = Duration::from_millis(100);
 /// Longest pause between two attempts to connect.
@@ -37,10 +38,9 @@ const MAX_IDLE_MESSAGES: usize = 1000;
 const CLOSE_TIMEOUT: Duration = Duration::from_millis(500);
 /// Length to which a server's error text is cut, characters.
 const MAX_ERROR_CHARS: usize = 2000;
-/// Port of an address without one: that of openpi's servers.
+/// Port of an address without one, as of openpi's servers.
 const DEFAULT_PORT: u16 = 8000;
 
-/// Protocol of a policy server.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
 pub enum ServerProtocol {
     /// openpi: the server sends metadata first, then a chunk of actions per observation.
@@ -52,12 +52,10 @@ pub enum ServerProtocol {
     VlaEval,
 }
 
-/// Address and protocol of a policy server.
 #[derive(Clone, Debug)]
 pub struct PolicyServer {
     /// `ws://host:port`, optionally with a path.
     pub url: String,
-    /// Protocol.
     pub protocol: ServerProtocol,
     /// Keys and units of observations and actions.
     pub profile: Profile,
@@ -65,18 +63,13 @@ pub struct PolicyServer {
     pub timeout: Duration,
     /// Sent as `Authorization: Api-Key …`, if present.
     pub api_key: Option<String>,
-    /// Flag that cancels the run.
     pub cancel: &'static CancelFlag,
 }
 
 impl PolicyServer {
     /// A failure of this server; `what` continues "the policy server URL …".
-    pub(super) fn error(&self, what: &str) -> PolicyError {
-        PolicyError::Server { url: self.url.clone(), problem: what.to_owned() }
-    }
-
-    fn check_cancel(&self) -> Result<(), PolicyError> {
-        if self.cancel.requested() { Err(PolicyError::Interrupted) } else { Ok(()) }
+    pub(super) fn error(&self, what: impl Display) -> PolicyError {
+        PolicyError::Server { url: self.url.clone(), problem: what.to_string() }
     }
 
     /// End of an operation that begins now.
@@ -91,35 +84,31 @@ impl PolicyServer {
         )
     }
 
-    fn check_deadline(&self, deadline: Instant, what: &str) -> Result<(), PolicyError> {
-        self.check_cancel()?;
-        if Instant::now() < deadline {
-            return Ok(());
-        }
-        let seconds = self.timeout.as_secs_f64();
-        Err(self
-            .error(&format!("{what} within {seconds} s; raise the timeout of the policy if it needs longer")))
+    fn proceed(&self) -> Result<(), PolicyError> {
+        if self.cancel.requested() { Err(PolicyError::Interrupted) } else { Ok(()) }
     }
 
-    fn socket_error(&self, error: &Error) -> PolicyError {
+    /// The failure of an operation on the socket; `what` says what the server did not do in time.
+    fn failure(&self, error: &Error, what: &str) -> PolicyError {
         match error {
+            _ if is_timeout(error) && self.cancel.requested() => PolicyError::Interrupted,
+            _ if is_timeout(error) => {
+                let seconds = self.timeout.as_secs_f64();
+                let longer = "raise the timeout of the policy if it needs longer";
+                self.error(format_args!("{what} within {seconds} s; {longer}"))
+            }
             Error::ConnectionClosed
             | Error::AlreadyClosed
             | Error::Protocol(ProtocolError::SendAfterClosing) => self.error("closed the connection"),
-            Error::Capacity(_) => self.error(&format!(
-                "sent more than {} MiB in one message: no chunk of actions is as long",
-                MAX_MESSAGE_BYTES >> 20
-            )),
-            Error::Io(error) => self.error(&format!("cannot be reached any more: {error}")),
-            Error::Protocol(_) => self.error(&format!("broke the websocket protocol: {error}")),
-            other => self.error(&format!("is not a websocket server: {other}")),
-        }
-    }
-
-    fn transport_error(&self, error: TransportError<PolicyError>) -> PolicyError {
-        match error {
-            TransportError::Socket(error) => self.socket_error(&error),
-            TransportError::Aborted(error) => error,
+            Error::Capacity(_) => {
+                let most = MAX_MESSAGE_BYTES >> 20;
+                self.error(format_args!(
+                    "sent more than {most} MiB in one message: no chunk of actions is as long"
+                ))
+            }
+            Error::Io(error) => self.error(format_args!("cannot be reached any more: {error}")),
+            Error::Protocol(_) => self.error(format_args!("broke the websocket protocol: {error}")),
+            other => self.error(format_args!("is not a websocket server: {other}")),
         }
     }
 }
@@ -128,33 +117,24 @@ impl PolicyServer {
 #[derive(Debug)]
 pub(super) struct PolicyConnection {
     pub(super) server: PolicyServer,
-    socket: WebSocket<PollingStream>,
+    socket: WebSocket<TimedStream<'static>>,
     /// Number of the last message sent (vla-eval).
     pub(super) seq: u64,
     /// True if the server asked for an observation in every control step.
     pub(super) observes_every_step: bool,
-    /// Number of the last ping sent.
     pings: u64,
 }
 
 impl PolicyConnection {
     /// Connects. Retries while the server cannot be reached, until `deadline`.
-    ///
-    /// # Errors
-    /// The address is invalid, or no connection was made in time.
     pub(super) fn open(server: &PolicyServer, deadline: Instant) -> Result<Self, PolicyError> {
         let request = request(server)?;
         let mut pause = FIRST_PAUSE;
         loop {
             let reason = match connect(&request, server, deadline) {
                 Ok(socket) => {
-                    return Ok(Self {
-                        server: server.clone(),
-                        socket,
-                        seq: 0,
-                        observes_every_step: false,
-                        pings: 0,
-                    });
+                    let server = server.clone();
+                    return Ok(Self { server, socket, seq: 0, observes_every_step: false, pings: 0 });
                 }
                 Err(ConnectError::Final(error)) => return Err(error),
                 Err(ConnectError::Retry(reason)) => reason,
@@ -169,13 +149,10 @@ impl PolicyConnection {
     }
 
     /// Sends a message until `deadline`.
-    ///
-    /// # Errors
-    /// The connection fails, or the server does not accept the message in time.
     pub(super) fn send(&mut self, value: &Value, deadline: Instant) -> Result<(), PolicyError> {
-        let server = &self.server;
-        let on_wait = || server.check_deadline(deadline, "did not accept an observation");
-        transport::send(&mut self.socket, value, on_wait).map_err(|error| server.transport_error(error))
+        self.socket.get_mut().wait_until(deadline);
+        let sent = self.socket.send(Message::binary(pack(value)));
+        sent.map_err(|error| self.server.failure(&error, "did not accept an observation"))
     }
 
     /// Receives the next message until `deadline`. `what` says what the server did not do, such as "did not answer".
@@ -183,14 +160,16 @@ impl PolicyConnection {
     /// # Errors
     /// The connection fails, or the server sends text (its error message), an invalid message, or nothing in time.
     pub(super) fn receive(&mut self, deadline: Instant, what: &str) -> Result<Value, PolicyError> {
+        self.socket.get_mut().wait_until(deadline);
         loop {
-            match self.receive_frame(deadline, what)? {
-                Message::Binary(bytes) => {
-                    return unpack(&bytes).map_err(|error| self.server.error(&format!("sent {error}")));
+            match self.socket.read() {
+                Ok(Message::Binary(bytes)) => {
+                    return unpack(&bytes).map_err(|error| self.server.error(format_args!("sent {error}")));
                 }
-                Message::Text(text) => return Err(self.reported_error(&text)),
-                Message::Close(_) => return Err(self.server.socket_error(&Error::ConnectionClosed)),
-                Message::Ping(_) | Message::Pong(_) | Message::Frame(_) => {}
+                Ok(Message::Text(text)) => return Err(self.reported_error(&text)),
+                Ok(Message::Close(_)) => return Err(self.server.failure(&Error::ConnectionClosed, what)),
+                Ok(Message::Ping(_) | Message::Pong(_) | Message::Frame(_)) => {}
+                Err(error) => return Err(self.server.failure(&error, what)),
             }
         }
     }
@@ -198,42 +177,34 @@ impl PolicyConnection {
     /// Checks that the server sent nothing after its last reply: sends a ping and waits for its pong.
     /// Frames keep their order, so a message sent before the pong arrives before it. A connection that the
     /// server closed meanwhile passes.
-    ///
-    /// # Errors
-    /// The server sent a message, or no pong until `deadline`.
-    pub(super) fn check_silence(&mut self, deadline: Instant) -> Result<(), PolicyError> {
+    pub(super) fn expect_silence(&mut self, deadline: Instant) -> Result<(), PolicyError> {
         self.pings += 1;
         let own = self.pings.to_be_bytes();
-        let ping = Message::Ping(own.to_vec().into());
-        let server = &self.server;
-        let on_wait = || server.check_deadline(deadline, "did not accept a ping");
-        match transport::send_frame(&mut self.socket, ping, on_wait) {
+        self.socket.get_mut().wait_until(deadline);
+        match self.socket.send(Message::Ping(own.to_vec().into())) {
+            Err(error) if is_timeout(&error) => {
+                return Err(self.server.failure(&error, "did not accept a ping"));
+            }
+            Err(_) => return Ok(()),
             Ok(()) => {}
-            Err(TransportError::Aborted(error)) => return Err(error),
-            Err(TransportError::Socket(_)) => return Ok(()),
         }
         loop {
-            let server = &self.server;
-            let on_wait = |_: &mut _| server.check_deadline(deadline, "did not answer a ping");
-            match transport::receive(&mut self.socket, on_wait) {
+            match self.socket.read() {
                 Ok(Message::Pong(payload)) if *payload == own => return Ok(()),
-                Ok(Message::Binary(_)) => return Err(server.unrequested()),
+                Ok(Message::Binary(_)) => return Err(self.server.unrequested()),
                 Ok(Message::Text(text)) => return Err(self.reported_error(&text)),
-                Ok(Message::Close(_)) | Err(TransportError::Socket(_)) => return Ok(()),
-                Ok(Message::Ping(_) | Message::Pong(_) | Message::Frame(_)) => {
-                    server.check_deadline(deadline, "did not answer a ping")?;
+                Err(error) if is_timeout(&error) => {
+                    return Err(self.server.failure(&error, "did not answer a ping"));
                 }
-                Err(TransportError::Aborted(error)) => return Err(error),
+                Ok(Message::Close(_)) | Err(_) => return Ok(()),
+                Ok(Message::Ping(_) | Message::Pong(_) | Message::Frame(_)) => {}
             }
         }
     }
 
     /// Reads what was received while the connection was idle, and answers pings. Returns true if it can still be used.
-    ///
-    /// # Errors
-    /// The server sent a message.
     pub(super) fn is_open(&mut self) -> Result<bool, PolicyError> {
-        if self.socket.get_mut().set_nonblocking(true).is_err() {
+        if self.socket.get_mut().wait_never().is_err() {
             return Ok(false);
         }
         for _ in 0..MAX_IDLE_MESSAGES {
@@ -241,11 +212,9 @@ impl PolicyConnection {
                 Ok(Message::Ping(_) | Message::Pong(_)) => {}
                 Ok(Message::Binary(_)) => return Err(self.server.unrequested()),
                 Ok(Message::Text(text)) => return Err(self.reported_error(&text)),
-                Err(Error::Io(error)) if would_block(&error) => {
-                    // The server may have closed the websocket, but not yet its TCP connection.
-                    return Ok(
-                        self.socket.can_write() && self.socket.get_mut().set_nonblocking(false).is_ok()
-                    );
+                // The server may have closed the websocket, but not yet its TCP connection.
+                Err(Error::Io(error)) if error.kind() == ErrorKind::WouldBlock => {
+                    return Ok(self.socket.can_write());
                 }
                 // The end: a new connection is needed.
                 _ => return Ok(false),
@@ -254,29 +223,19 @@ impl PolicyConnection {
         Ok(false)
     }
 
-    fn receive_frame(&mut self, deadline: Instant, what: &str) -> Result<Message, PolicyError> {
-        let server = &self.server;
-        // A server that sends pings without a pause never makes a read wait.
-        server.check_deadline(deadline, what)?;
-        let message = transport::receive(&mut self.socket, |_| server.check_deadline(deadline, what));
-        message.map_err(|error| server.transport_error(error))
-    }
-
     fn reported_error(&self, text: &str) -> PolicyError {
-        self.server.error(&format!("reported an error:\n{}", end_of(text)))
+        self.server.error(format_args!("reported an error:\n{}", end_of(text)))
     }
 }
 
 impl Drop for PolicyConnection {
-    /// Sends a close frame and waits for that of the server, so that its log shows a regular end.
+    /// Sends a close frame and waits for the server's, so that its log shows a regular end.
     fn drop(&mut self) {
-        let _ = self.socket.get_mut().set_nonblocking(false);
-        let deadline = Instant::now() + CLOSE_TIMEOUT;
-        let may_wait = || Instant::now() <= deadline && !self.server.cancel.requested();
-        let on_wait = |_: &mut _| if may_wait() { Ok(()) } else { Err(()) };
-        let is_sent = transport::close(&mut self.socket, CloseCode::Normal, may_wait).is_ok();
+        self.socket.get_mut().wait_until(Instant::now() + CLOSE_TIMEOUT);
+        let frame = CloseFrame { code: CloseCode::Normal, reason: "".into() };
+        let is_sent = self.socket.close(Some(frame)).is_ok();
         // The socket reports the end of the closing handshake as an error.
-        while is_sent && may_wait() && transport::receive(&mut self.socket, on_wait).is_ok() {}
+        while is_sent && self.socket.read().is_ok() {}
     }
 }
 
@@ -295,30 +254,30 @@ fn connect(
     request: &ClientRequestBuilder,
     server: &PolicyServer,
     deadline: Instant,
-) -> Result<WebSocket<PollingStream>, ConnectError> {
-    let stream = PollingStream::new(connect_tcp(server, deadline)?)?;
-    let handshake =
-        client::client_with_config(request.clone(), stream, Some(websocket_config(MAX_MESSAGE_BYTES)));
-    let on_wait = || {
-        server.check_cancel().map_err(ConnectError::Final)?;
-        match Instant::now() > deadline {
-            true => Err(ConnectError::Retry("it accepts connections but says nothing".to_owned())),
-            false => Ok(()),
-        }
+) -> Result<WebSocket<TimedStream<'static>>, ConnectError> {
+    let mut stream = TimedStream::new(connect_tcp(server, deadline)?, server.cancel)?;
+    stream.wait_until(deadline);
+    let config = websocket_config(MAX_MESSAGE_BYTES);
+    let error = match client::client_with_config(request.clone(), stream, Some(config)) {
+        Ok((socket, _)) => return Ok(socket),
+        Err(HandshakeError::Failure(error)) => error,
+        Err(HandshakeError::Interrupted(_)) => Error::Io(ErrorKind::WouldBlock.into()),
     };
-    match complete_handshake(handshake, on_wait) {
-        Ok((socket, _)) => Ok(socket),
-        Err(TransportError::Aborted(error)) => Err(error),
+    Err(match error {
+        _ if is_timeout(&error) => match server.proceed() {
+            Err(interrupted) => ConnectError::Final(interrupted),
+            Ok(()) => ConnectError::Retry("it accepts connections but says nothing".to_owned()),
+        },
         // A server that is being started may close connections at first.
-        Err(TransportError::Socket(Error::Io(error))) => Err(error.into()),
-        Err(TransportError::Socket(Error::Http(response))) if response.status().as_u16() == 503 => {
-            Err(ConnectError::Retry("HTTP status 503".to_owned()))
+        Error::Io(error) => error.into(),
+        Error::Http(response) if response.status().as_u16() == 503 => {
+            ConnectError::Retry("HTTP status 503".to_owned())
         }
-        Err(TransportError::Socket(error)) => {
+        error => {
             let (url, reason) = (server.url.clone(), error.to_string());
-            Err(ConnectError::Final(PolicyError::NotWebsocket { url, reason }))
+            ConnectError::Final(PolicyError::NotWebsocket { url, reason })
         }
-    }
+    })
 }
 
 /// Connects in a thread, since neither a name's resolution nor a connection attempt can be interrupted. The
@@ -337,7 +296,7 @@ fn connect_tcp(server: &PolicyServer, deadline: Instant) -> Result<TcpStream, Co
             }
             Err(RecvTimeoutError::Timeout) => {}
         }
-        server.check_cancel().map_err(ConnectError::Final)?;
+        server.proceed().map_err(ConnectError::Final)?;
         if Instant::now() > deadline {
             return Err(ConnectError::Retry("it does not accept connections".to_owned()));
         }
@@ -387,7 +346,7 @@ fn request(server: &PolicyServer) -> Result<ClientRequestBuilder, PolicyError> {
 fn sleep(pause: Duration, server: &PolicyServer) -> Result<(), PolicyError> {
     let end = Instant::now() + pause;
     while Instant::now() < end {
-        server.check_cancel()?;
+        server.proceed()?;
         thread::sleep(POLL_INTERVAL.min(end.saturating_duration_since(Instant::now())));
     }
     Ok(())

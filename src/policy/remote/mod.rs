@@ -66,13 +66,11 @@ impl PolicyConnections {
     }
 }
 
-/// A policy on a server.
 #[derive(Debug)]
 pub struct RemotePolicy {
     connections: Arc<PolicyConnections>,
     /// `None` before the first episode and after a failure.
     connection: Option<PolicyConnection>,
-    /// Identity of the next message.
     query: QueryId,
 }
 
@@ -152,7 +150,7 @@ impl Policy for RemotePolicy {
         let deadline = connection.server.deadline();
         match self.connections.server.protocol {
             // The reply that the last actions came from may have been that to an earlier observation.
-            ServerProtocol::Openpi => connection.check_silence(deadline)?,
+            ServerProtocol::Openpi => connection.expect_silence(deadline)?,
             ServerProtocol::VlaEval if vla_eval::end(&mut connection, deadline).is_err() => return Ok(()),
             ServerProtocol::VlaEval => {}
         }
@@ -171,70 +169,54 @@ fn greet_openpi(connection: &mut PolicyConnection, deadline: Instant) -> Result<
     let metadata = connection.receive(deadline, "did not send its first message, the metadata,")?;
     if metadata.as_map().is_none() {
         let what = format!("sent {} first; openpi servers send a map of metadata", kind(&metadata));
-        return Err(connection.server.error(&what));
+        return Err(connection.server.error(what));
     }
-    connection.observes_every_step = observes_every_step(&connection.server, &metadata)?;
-    check_action_codes(&connection.server, &metadata)
-}
-
-/// True if the entry `observe_every_step` of a server's metadata asks for an observation in every control step.
-///
-/// # Errors
-/// It is neither true nor false.
-fn observes_every_step(server: &PolicyServer, metadata: &Value) -> Result<bool, PolicyError> {
-    let Some(stated) = entry(metadata, "observe_every_step").filter(|value| !value.is_nil()) else {
-        return Ok(false);
+    connection.observes_every_step = match entry(&metadata, "observe_every_step") {
+        None | Some(Value::Nil) => false,
+        Some(Value::Boolean(every_step)) => *every_step,
+        Some(other) => {
+            let stated = kind(other);
+            let what = format!("has {stated} as observe_every_step in its metadata; expected true or false");
+            return Err(connection.server.error(what));
+        }
     };
-    stated.as_bool().ok_or_else(|| {
-        server.error(&format!(
-            "has {} as observe_every_step in its metadata; expected true or false",
-            kind(stated)
-        ))
-    })
+    expect_action_codes(&connection.server, &metadata)
 }
 
-/// Checks the entries `gripper`, `pose`, `units` and `rotation` of a server's metadata, by which it states the
-/// meaning of its actions.
-///
-/// # Errors
-/// They are not those of the profile.
-fn check_action_codes(server: &PolicyServer, metadata: &Value) -> Result<(), PolicyError> {
+/// Compares the entries `gripper`, `pose`, `units` and `rotation` of a server's metadata, which state the meaning of
+/// its actions, with those of the profile.
+fn expect_action_codes(server: &PolicyServer, metadata: &Value) -> Result<(), PolicyError> {
     let Profile { name, actions, .. } = &server.profile;
-    let stated = |key: &str| {
-        let value = entry(metadata, key).filter(|value| !value.is_nil())?;
-        let bytes = value.as_str().map(str::as_bytes).or(value.as_slice());
-        let text = bytes.map(|bytes| String::from_utf8_lossy(bytes).chars().take(80).collect::<String>());
-        Some(text.ok_or_else(|| kind(value)))
-    };
     let (codes, poses) = (GripCode::ALL.map(GripCode::name), PoseEncoding::NAMES);
+    let stated = |key| entry(metadata, key).filter(|value| !value.is_nil());
+    let bytes =
+        |value: &Value| value.as_str().map(str::as_bytes).or(value.as_slice()).unwrap_or_default().to_vec();
     for (key, known, own, what) in [
         ("gripper", codes.as_slice(), actions.gripper.code.name(), "the grip code"),
         ("pose", poses.as_slice(), actions.pose.name(), "actions of pose"),
     ] {
-        let problem = match stated(key) {
-            Some(Ok(code)) if code == own => continue,
-            None => continue,
-            Some(Ok(code)) if known.contains(&code.as_str()) => format!(
+        let Some(stated) = stated(key) else { continue };
+        let code = bytes(stated);
+        let problem = match known.iter().find(|known| known.as_bytes() == code) {
+            Some(code) if *code == own => continue,
+            Some(code) => format!(
                 "states {what} {code} in its metadata, and the profile {name} reads {own}: choose one that reads {code}"
             ),
-            Some(Ok(code)) => format!(
-                "states {code:?} in the entry {key} of its metadata; expected one of {}",
-                known.join(", ")
-            ),
-            Some(Err(kind)) => {
-                format!("has {kind} as {key} in its metadata; expected one of {}", known.join(", "))
+            None => {
+                let (known, stated) = (known.join(", "), stated.to_string());
+                format!("states {stated:.80} in the entry {key} of its metadata; expected one of {known}")
             }
         };
-        return Err(server.error(&problem));
+        return Err(server.error(problem));
     }
     // A profile with units converts what the server answers.
     for (key, others, own) in
         [("units", OTHER_UNITS, "m and rad"), ("rotation", OTHER_ROTATIONS, "axis_angle, in rad")]
     {
-        if let Some(Ok(stated)) = stated(key).filter(|_| actions.units.is_none())
-            && others.split(' ').any(|other| stated.trim().eq_ignore_ascii_case(other))
-        {
-            return Err(server.error(&format!(
+        let stated = stated(key).map(bytes).filter(|_| actions.units.is_none()).unwrap_or_default();
+        if others.split(' ').any(|other| stated.trim_ascii().eq_ignore_ascii_case(other.as_bytes())) {
+            let stated = String::from_utf8_lossy(&stated);
+            return Err(server.error(format_args!(
                 "states {stated:?} in the entry {key} of its metadata, and softvt reads {own}: convert them there, or \
                  choose a profile with units"
             )));
@@ -259,7 +241,7 @@ fn ask_openpi(
     let deadline = connection.server.deadline();
     connection.send(&encode::openpi(observation, &connection.server.profile, query), deadline)?;
     let response = connection.receive(deadline, "did not answer")?;
-    connection.check_silence(deadline)?;
+    connection.expect_silence(deadline)?;
     Ok(response)
 }
 

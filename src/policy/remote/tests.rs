@@ -15,7 +15,7 @@ use super::*;
 use softvt_common::cancel::CancelFlag;
 
 use crate::{
-    EncodedGrip, GripTarget, RobotState, StatePart,
+    EncodedGrip, GripTarget, StatePart,
     msgpack::{map, pack},
     profile::{ActionEncoding, GripperValues, ObservationSource, PoseEncoding, ProfileInput},
 };
@@ -83,19 +83,6 @@ fn policy_server(url: String, code: GripCode, timeout: Duration) -> PolicyServer
     PolicyServer { url, protocol: ServerProtocol::Openpi, profile, timeout, api_key: None, cancel: &CANCEL }
 }
 
-fn observation() -> Observation {
-    Observation {
-        time_s: 0.0,
-        robot: RobotState::default(),
-        prompt: String::new(),
-        cameras: Vec::new(),
-        past: Vec::new(),
-        tactile: None,
-        forces: None,
-        force_history: Vec::new(),
-    }
-}
-
 /// Closures of the chunks of an episode of so many questions, with a pause after each chunk.
 fn episode(
     connections: &Arc<PolicyConnections>,
@@ -103,19 +90,12 @@ fn episode(
     pause: Duration,
 ) -> Result<Vec<f64>, String> {
     let mut policy = RemotePolicy::new(connections.clone());
-    let brief = EpisodeBrief {
-        suite: "one".to_owned(),
-        task: 0,
-        prompt: String::new(),
-        episode: 0,
-        seed: 0,
-        alias: None,
-    };
+    let brief = EpisodeBrief { suite: "one".to_owned(), ..EpisodeBrief::default() };
     let mut run = || {
         policy.reset(&brief)?;
         let mut closures = Vec::new();
         for _ in 0..questions {
-            match policy.act(&observation())?.commands[0].grip {
+            match policy.act(&Observation::default())?.commands[0].grip {
                 EncodedGrip::Target(GripTarget::Closure(closure)) => closures.push(closure),
                 other => panic!("{other:?}"),
             }
@@ -286,15 +266,20 @@ fn a_server_may_state_the_meaning_of_its_actions() {
         assert!(error.contains("expected one of continuous, binary, two-width, force"), "{error}");
     }
     assert_eq!(check_entry("pose", "absolute".into()), Ok(()));
-    for (key, own, other) in [("units", "m", "mm"), ("rotation", "axis_angle", "degrees")] {
-        assert_eq!(check_entry(key, own.into()), Ok(()));
-        let error = check_entry(key, other.into()).unwrap_err();
-        assert!(error.contains(&format!("states \"{other}\" in the entry {key} of its metadata")), "{error}");
-    }
     let error = check_entry("pose", "joints".into()).unwrap_err();
     assert!(error.contains("actions of pose joints") && error.contains("state reads absolute"), "{error}");
     let error = check_entry("pose", "tool".into()).unwrap_err();
     assert!(error.contains("expected one of absolute, delta, delta_osc, joints"), "{error}");
+    assert_eq!(check_entry("units", "m".into()), Ok(()));
+    assert_eq!(check_entry("rotation", "axis_angle".into()), Ok(()));
+    for (key, other) in
+        [("units", "mm"), ("units", "Degrees"), ("rotation", "euler_xyz"), ("rotation", "quat ")]
+    {
+        let error = check_entry(key, other.into()).unwrap_err();
+        assert!(error.contains(&format!("states {other:?} in the entry {key}")), "{error}");
+    }
+    let bytes = check_entry("rotation", Value::Binary(b"euler".to_vec())).unwrap_err();
+    assert!(bytes.contains("softvt reads axis_angle, in rad"), "{bytes}");
 }
 
 #[test]
@@ -310,7 +295,8 @@ fn a_vla_eval_server_that_states_other_actions_is_refused() {
             ("rotation", part(rotation, [-3.15, 3.15])),
             ("gripper", part(gripper, range)),
         ]);
-        vla_eval::check_action_spec(&server, &map([("action_spec", spec)])).map_err(|error| error.to_string())
+        vla_eval::expect_action_spec(&server, &map([("action_spec", spec)]))
+            .map_err(|error| error.to_string())
     };
     let delta = ["delta_xyz", "axis_angle", "binary_close_positive"];
     assert_eq!(check("libero", delta, [-1.0, 1.0]), Ok(()));

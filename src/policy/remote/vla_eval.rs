@@ -4,7 +4,7 @@
 //! answered by an action of the same seq. An observation has images in `images`, numbers in `states`, and
 //! the prompt in `task_description`.
 
-use std::time::Instant;
+use std::{fmt, time::Instant};
 
 use rmpv::Value;
 
@@ -29,30 +29,27 @@ pub(super) fn greet(connection: &mut PolicyConnection, deadline: Instant) -> Res
     let value = connection.receive(deadline, "did not answer")?;
     let (kind, payload) = parts(connection, &value)?;
     if kind != "hello" {
-        return Err(connection.server.error(&format!("answered hello with {kind:?}")));
+        return Err(connection.server.error(format_args!("answered hello with {kind:?}")));
     }
     match entry(payload, "protocol_version").and_then(Value::as_u64) {
         Some(VERSION) | None => {
-            super::check_action_codes(&connection.server, payload)?;
-            check_action_spec(&connection.server, payload)
+            super::expect_action_codes(&connection.server, payload)?;
+            expect_action_spec(&connection.server, payload)
         }
         Some(other) => {
             let what = format!("uses version {other} of vla-eval's protocol; expected {VERSION}");
-            Err(connection.server.error(&what))
+            Err(connection.server.error(what))
         }
     }
 }
 
 /// Checks what the entry `action_spec` of a server states of its actions, in the words of vla-eval's
 /// specs. Unknown formats pass.
-///
-/// # Errors
-/// It contradicts the profile.
-pub(super) fn check_action_spec(server: &PolicyServer, hello: &Value) -> Result<(), PolicyError> {
+pub(super) fn expect_action_spec(server: &PolicyServer, hello: &Value) -> Result<(), PolicyError> {
     let Profile { name, actions, .. } = &server.profile;
     let Some(spec) = entry(hello, "action_spec") else { return Ok(()) };
     let format = |part: &str| entry(entry(spec, part)?, "format").and_then(Value::as_str);
-    let refuse = |what: String| Err(server.error(&format!("states {what} in its action_spec")));
+    let refuse = |what: fmt::Arguments| Err(server.error(format_args!("states {what} in its action_spec")));
     let (own, is_absolute) = (actions.pose.name(), actions.pose == PoseEncoding::Absolute);
     let is_delta = matches!(actions.pose, PoseEncoding::Delta { .. } | PoseEncoding::DeltaOsc { .. });
     let position = format("position");
@@ -62,19 +59,21 @@ pub(super) fn check_action_spec(server: &PolicyServer, hello: &Value) -> Result<
         _ => None,
     };
     if let (Some(position), Some(needed)) = (position, needed) {
-        return refuse(format!(
+        return refuse(format_args!(
             "positions as {position}, and the profile {name} reads actions of pose {own}: choose a profile with pose = {needed}"
         ));
     }
     let rotation = format("rotation").unwrap_or_default();
     let is_other_rotation = match rotation {
         "quaternion_xyzw" | "rot6d_interleaved" => true,
-        // Of a small rotation, Euler angles are those of its axis.
+        // Of a small rotation, Euler angles are its axis-angle.
         "euler_xyz" => is_absolute,
         _ => false,
     };
     if is_other_rotation {
-        return refuse(format!("rotations as {rotation}, and softvt reads axis_angle: convert them there"));
+        return refuse(format_args!(
+            "rotations as {rotation}, and softvt reads axis_angle: convert them there"
+        ));
     }
     let GripperValues { open, closed, code, .. } = actions.gripper;
     let range = entry(spec, "gripper").and_then(|gripper| entry(gripper, "range")).and_then(Value::as_array);
@@ -95,7 +94,7 @@ pub(super) fn check_action_spec(server: &PolicyServer, hello: &Value) -> Result<
     if code != GripCode::Force && (is_reversed || is_other_range) {
         let gripper = format("gripper").unwrap_or_default();
         let range = range.map_or(String::new(), |[low, high]| format!(" from {low} to {high}"));
-        return refuse(format!(
+        return refuse(format_args!(
             "the gripper as {gripper}{range}, and the profile {name} reads {open} as open and {closed} as closed: choose or \
              write a profile with these values"
         ));
@@ -139,7 +138,7 @@ pub(super) fn infer(
         match kind {
             "error" => {
                 let text = entry(payload, "error").and_then(Value::as_str).unwrap_or("no reason given");
-                return Err(connection.server.error(&format!("reported an error: {text}")));
+                return Err(connection.server.error(format_args!("reported an error: {text}")));
             }
             "action" if answered == Some(connection.seq) => {
                 return decode::chunk(payload, &connection.server.profile.actions);
@@ -147,7 +146,7 @@ pub(super) fn infer(
             // The response to an earlier message.
             "action" if answered.is_some_and(|answered| answered < connection.seq) => {}
             other => {
-                return Err(connection.server.error(&format!("answered an observation with {other:?}")));
+                return Err(connection.server.error(format_args!("answered an observation with {other:?}")));
             }
         }
     }
@@ -200,12 +199,11 @@ fn send(
     connection.send(&message, deadline)
 }
 
-/// Type and payload of a message.
 fn parts<'a>(connection: &PolicyConnection, value: &'a Value) -> Result<(&'a str, &'a Value), PolicyError> {
     let kind = entry(value, "type").and_then(Value::as_str);
     kind.zip(entry(value, "payload")).ok_or_else(|| {
         let has = names(value);
-        connection.server.error(&format!(
+        connection.server.error(format_args!(
             "sent a message that is not of vla-eval's protocol: it has {has}, not type and payload"
         ))
     })

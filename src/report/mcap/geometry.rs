@@ -18,7 +18,6 @@ use softvt_sensing::camera::DisplayMesh;
 const WORLD: &str = "world";
 /// The frame between the fingers.
 const TOOL: &str = "tool";
-/// Frames of the left and right pad.
 pub(super) const PAD_FRAMES: [&str; 2] = ["pad_left", "pad_right"];
 /// Size of a pixel of the viewer on rigid objects, m, which are written once.
 const PIXEL: f32 = 1e-3;
@@ -63,7 +62,6 @@ impl SceneGeometry {
         self.soft_names.values()
     }
 
-    /// The frames of a state.
     pub(super) fn transforms(
         &self,
         sensors: &Sensors,
@@ -134,7 +132,7 @@ impl SceneGeometry {
     }
 }
 
-/// A name of a frame that no other has: links of the robot may share a name, and objects that of a camera.
+/// A name of a frame that no other has: links of the robot may share a name, and objects may have a camera's.
 fn unique_name(name: &str, known: &BTreeSet<String>) -> String {
     let numbered = (2..).map(|number| format!("{name}_{number}"));
     std::iter::once(name.to_owned()).chain(numbered).find(|name| !known.contains(name)).unwrap_or_default()

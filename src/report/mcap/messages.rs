@@ -20,7 +20,6 @@ use softvt_scene::Camera;
 /// Quality of the images, 1 to 100.
 const JPEG_QUALITY: u8 = 90;
 
-/// State of the hand.
 #[derive(Encode)]
 pub(super) struct Gripper {
     /// True width, m.
@@ -45,7 +44,6 @@ pub(super) struct Deformation {
     d_pct: f64,
     /// Its limit τ, %; not a number without a limit.
     tau_pct: f64,
-    /// D over τ.
     d_over_tau: f64,
 }
 
@@ -112,12 +110,10 @@ pub(super) fn joints(robot: &RobotState, time_ns: u64) -> JointStates {
     JointStates { timestamp: timestamp(time_ns), joints: names.zip(positions).map(joint).collect() }
 }
 
-/// The prompt, at the start.
 pub(super) fn prompt(record: &EpisodeRecord) -> Log {
     log_line(record, 0, Level::Info, record.header.prompt.clone())
 }
 
-/// The verdict, at the end.
 pub(super) fn verdict(record: &EpisodeRecord, time_ns: u64) -> Log {
     let level = if record.verdict.safety { Level::Info } else { Level::Warning };
     log_line(record, time_ns, level, record.outcome_name().to_owned())

@@ -51,11 +51,9 @@ use softvt_rollout::{SensingError, Sensors, StateRecording};
 use softvt_runs::record::EpisodeRecord;
 use softvt_scene::Camera;
 
-/// Edge of the camera images, pixels: that of the profiles.
+/// Edge of the camera images, pixels, as in the profiles.
 const IMAGE_EDGE: usize = 224;
 
-/// Why an MCAP file cannot be written.
-#[allow(missing_docs, reason = "the messages describe the variants")]
 #[derive(Debug, thiserror::Error)]
 pub enum EpisodeMcapError {
     #[error(transparent)]
@@ -70,13 +68,11 @@ pub enum EpisodeMcapError {
     Interrupted,
 }
 
-/// A message before it is written.
 struct EncodedMessage {
     topic: u16,
     bytes: Vec<u8>,
 }
 
-/// The topics of a file.
 struct Topics {
     transforms: u16,
     scene: u16,
@@ -86,7 +82,6 @@ struct Topics {
     log: u16,
     contacts: [u16; 2],
     tactile: [u16; 2],
-    /// By soft body.
     nodes: Vec<u16>,
     cameras: Vec<CameraTopics>,
 }
@@ -235,7 +230,7 @@ impl McapFile {
     }
 }
 
-/// What the messages of the states are made of.
+/// Inputs of the messages of states.
 struct StateMessages<'a> {
     recording: &'a StateRecording,
     geometry: &'a SceneGeometry,
@@ -243,7 +238,6 @@ struct StateMessages<'a> {
 }
 
 impl StateMessages<'_> {
-    /// The messages of a state.
     fn at(&self, sensors: &mut Sensors, index: usize) -> Result<Vec<EncodedMessage>, EpisodeMcapError> {
         let (recording, topics, geometry) = (self.recording, self.topics, self.geometry);
         let (frame, time_ns) = (&recording.frames[index], time_ns(index));

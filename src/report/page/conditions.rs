@@ -23,9 +23,7 @@ const LABEL_DISTANCE: f64 = 0.13;
 /// Place of the reference, and of the smallest and largest value, as fractions of the width.
 const REFERENCE: f64 = 0.07;
 const VALUES: [f64; 2] = [0.27, 0.93];
-/// A line through rates or medians.
 const TREND: Stroke = Stroke::Curve { tone: Tone::Ink, dash: 0 };
-/// D/τ of an episode.
 const EPISODE: Symbol = Symbol::DOT.with_radius(2.4);
 
 /// Two plots per factor, side by side.
@@ -45,7 +43,6 @@ pub(super) fn trends(suite: &ConditionEffects) -> Markup {
     }
 }
 
-/// Places of the values of a factor.
 struct ValueAxis {
     low: f64,
     high: f64,
@@ -77,9 +74,8 @@ impl ValueAxis {
 fn panel(trend: &FactorTrend, reference: &TrendPoint, largest: f64) -> Markup {
     let axis = ValueAxis::of(&trend.points);
     let points: Vec<&TrendPoint> = std::iter::once(reference).chain(&trend.points).collect();
-    let label = format!("Safety and D/τ over {}; the numbers are in the table below", trend.factor);
     html! {
-        div.axes role="img" aria-label=(label) {
+        div.axes role="img" aria-label={ "Safety and D/τ over " (trend.factor) "; the numbers are in the table below" } {
             (fluid_chart(&safety_chart(&points, &axis), SAFETY_HEIGHT))
             (fluid_chart(&ratio_chart(&points, &axis, &trend.factor, largest), RATIO_HEIGHT))
         }
@@ -135,7 +131,7 @@ fn ratio_chart(points: &[&TrendPoint], axis: &ValueAxis, factor: &str, largest: 
     ];
     marks.extend(of_reference);
     let log = if axis.is_log { ", log" } else { "" };
-    let label = format!("value of {}{log}", shortened(factor, MAX_NAME));
+    let label = "value of ".to_owned() + &shortened(factor, MAX_NAME) + log;
     let mut labelled = vec![(REFERENCE, "ref.".to_owned())];
     for value in points[1..].iter().filter_map(|point| point.value) {
         let place = axis.place(Some(value));

@@ -7,6 +7,7 @@ use crate::{
     d_axis::{D_TICKS, d_share},
     run_summary::RunSummary,
 };
+use softvt_common::text::decimal;
 use softvt_evaluation::{category::EpisodeCategory, statistics::Distribution};
 
 /// Height of a strip, pixels.
@@ -43,7 +44,6 @@ fn strip(run: &RunSummary) -> Markup {
     let dots: Vec<(f64, EpisodeCategory)> =
         run.run.records.iter().filter_map(|record| Some((record.d_over_tau()?, record.category()))).collect();
     let spread = Distribution::from_values(dots.iter().map(|(ratio, _)| *ratio).collect());
-    let median = spread.median.map_or_else(|| "no D".to_owned(), |median| format!("median {median:.2}"));
     let middle = y(0.5 * HEIGHT);
     html! {
         div.row {
@@ -60,7 +60,7 @@ fn strip(run: &RunSummary) -> Markup {
                 }
                 @for (k, (ratio, category)) in dots.iter().enumerate() { (dot(*ratio, *category, k)) }
             }
-            span.value { (median) br; "n " (spread.n) }
+            span.value { @if spread.median.is_some() { "median " (decimal(spread.median, 2)) } @else { "no D" } br; "n " (spread.n) }
         }
     }
 }

@@ -15,10 +15,8 @@ use crate::{
     task_names::object_name,
     video::{still_path, video_path},
 };
-use softvt_common::episode_id::EpisodeId;
-use softvt_common::text::counted;
+use softvt_common::text::{counted, decimal};
 use softvt_evaluation::category::EpisodeCategory;
-use softvt_runs::record::EpisodeRecord;
 
 /// Largest number of episodes of a category listed per run.
 const MAX_LISTED: usize = 24;
@@ -41,21 +39,25 @@ pub(super) fn failures(runs: &[RunSummary], out: &Path) -> Markup {
             ul.safe { @for run in safe { li { b { (run.name()) } ": " (without_failures(run)) } } }
         }
         @for (i, run) in failed.into_iter().enumerate() {
-            (subheading(&format!("failures-{i}"), &run.name()))
+            (subheading(format_args!("failures-{i}"), &run.name()))
             (failures_of_run(run, out, budget))
         }
     }
 }
 
-fn without_failures(run: &RunSummary) -> String {
+fn without_failures(run: &RunSummary) -> Markup {
     let count = run.run.records.len();
-    let what = match (run.is_soft(), count) {
-        (_, 0) => return "There is no episode yet.".to_owned(),
-        (false, _) => "reached the goal without a drop",
-        (true, 1) => "is safe",
-        (true, _) => "are safe",
-    };
-    if count == 1 { format!("The episode {what}.") } else { format!("All {count} episodes {what}.") }
+    html! {
+        @if count == 0 { "There is no episode yet." }
+        @else {
+            @if count == 1 { "The episode " } @else { "All " (count) " episodes " }
+            @match (run.is_soft(), count) {
+                (false, _) => "reached the goal without a drop.",
+                (true, 1) => "is safe.",
+                (true, _) => "are safe.",
+            }
+        }
+    }
 }
 
 fn failures_of_run(run: &RunSummary, out: &Path, budget: usize) -> Markup {
@@ -99,27 +101,19 @@ fn card(run: &RunSummary, episode: &UnsafeEpisode, out: &Path, budget: &mut Byte
             p {
                 b { (object_name(&header.asset)) }
                 span.interval { (title) @if let Some(video) = &video { " · " a href=(video) { "video" span.hidden { " of task " (id.task) " episode " (id.episode) } } } }
-                @if let Some(amount) = amount(episode.record) { span.amount { (amount) } }
+                @if let Some(ratio) = episode.record.d_over_tau().filter(|ratio| *ratio > 1.0) {
+                    span.amount {
+                        (decimal(Some(ratio), 1)) "\u{a0}× limit"
+                        @if let Some(pct) = episode.record.crushed_volume_pct() { ", crushed: " (decimal(Some(pct), 0)) "\u{a0}% collapsed" }
+                    }
+                }
                 (with_unbreakable_units(&episode.reason))
             }
             @if video.is_none() {
-                details { summary { "Commands" span.hidden { " for task " (id.task) " episode " (id.episode) } } @for command in commands(run, id) { code { (command) } } }
+                details { summary { "Commands" span.hidden { " for task " (id.task) " episode " (id.episode) } } code { (view_command(&run.run, id)) } code { (replay_command(&run.run, id)) } }
             }
         }
     }
-}
-
-/// How far D was above its limit, and how much of the volume collapsed if the object may be called crushed.
-fn amount(record: &EpisodeRecord) -> Option<String> {
-    let ratio = record.d_over_tau().filter(|ratio| *ratio > 1.0)?;
-    let crushed = record.crushed_volume_pct().map(|pct| format!(", crushed: {pct:.0}\u{a0}% collapsed"));
-    let crushed = crushed.unwrap_or_default();
-    Some(format!("{ratio:.1}\u{a0}× limit{crushed}"))
-}
-
-/// Commands that render an episode without a video, and that replay it.
-fn commands(run: &RunSummary, id: &EpisodeId) -> [String; 2] {
-    [view_command(&run.run, id), replay_command(&run.run, id)]
 }
 
 /// Replaces spaces between numbers and units by no-break spaces.

@@ -32,7 +32,6 @@ pub(super) fn fluid_chart(chart: &Chart, height: f32) -> Markup {
     }
 }
 
-/// A vertical axis of rates.
 pub(super) fn percent_axis(intervals: usize) -> Axis {
     let mut axis = Axis::linear("", 0.0, 100.0, intervals).with_grid();
     axis.ticks.iter_mut().for_each(|tick| tick.label += " %");

@@ -15,7 +15,6 @@ use softvt_runs::record::EpisodeRecord;
 
 /// Height of a chart, pixels.
 const HEIGHT: f32 = 192.0;
-/// Letters of a name.
 const MAX_NAME: usize = 24;
 /// Dashes of curves, which differ in them; colours belong to verdicts.
 const DASHES: usize = 6;
@@ -31,7 +30,7 @@ pub(super) fn kappa_charts(runs: &[RunSummary]) -> Markup {
             @if !runs.iter().all(is_flat) {
                 @let suite = &runs[0].summary.suite;
                 p.suite { (suite) }
-                div.axes.named role="img" aria-label=(format!("Safety Success over kappa, {suite}; the numbers are in the table above")) {
+                div.axes.named role="img" aria-label={ "Safety Success over kappa, " (suite) "; the numbers are in the table above" } {
                     (fluid_chart(&chart(runs), HEIGHT))
                 }
             }

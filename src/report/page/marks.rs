@@ -10,7 +10,6 @@ pub(super) fn x(fraction: f64) -> String {
     format!("{:.2}%", 100.0 * fraction.clamp(0.0, 1.0))
 }
 
-/// Coordinate in pixels.
 pub(super) fn y(at: f64) -> String {
     format!("{at:.1}")
 }

@@ -2,6 +2,7 @@
 
 use std::{
     collections::{BTreeMap, BTreeSet},
+    fmt,
     path::Path,
 };
 
@@ -13,6 +14,7 @@ use super::{
     marks::class,
 };
 use crate::{cells::tau_range, run_summary::RunSummary, task_names::object_name, video::video_path};
+use softvt_common::text::decimal;
 use softvt_evaluation::category::EpisodeCategory;
 use softvt_runs::{
     record::EpisodeRecord,
@@ -32,12 +34,17 @@ pub(super) fn matrices(runs: &[RunSummary], thumbnails: &Thumbnails, out: &Path)
         thumbnails.iter().filter_map(|(asset, image)| Some((asset, embed(image, &mut budget)?))).collect();
     html! {
         @for (i, of_suite) in soft.chunk_by(|a, b| a.summary.suite == b.summary.suite).enumerate() {
-            (matrix(&format!("matrix-{i}"), of_suite, &pictures, out))
+            (matrix(format_args!("matrix-{i}"), of_suite, &pictures, out))
         }
     }
 }
 
-fn matrix(id: &str, runs: &[&RunSummary], pictures: &BTreeMap<&String, DataImage>, out: &Path) -> Markup {
+fn matrix(
+    id: fmt::Arguments,
+    runs: &[&RunSummary],
+    pictures: &BTreeMap<&String, DataImage>,
+    out: &Path,
+) -> Markup {
     let assets: BTreeSet<&String> = runs.iter().flat_map(|run| run.summary.by_asset.keys()).collect();
     // Instances of one asset may have different limits.
     let tau = |asset: &str| {
@@ -87,23 +94,20 @@ fn cell(run: &RunSummary, asset: &str, out: &Path) -> Markup {
         EpisodeCategory::Safe => scores.d_over_tau.median,
         _ => shown.and_then(EpisodeRecord::d_over_tau),
     };
-    let crushed = match scores.crushed_over_limit {
-        0 => None,
-        _ if scores.episodes == 1 => Some("crushed".to_owned()),
-        count if count == scores.count(worst) || worst != EpisodeCategory::OverLimit => {
-            Some(format!("{count} crushed"))
-        }
-        count => Some(format!("{count} of them crushed")),
-    };
-    let text = ratio.map_or_else(|| "–".to_owned(), |ratio| format!("{ratio:.2}"));
-    let failed = match (worst, scores.episodes) {
-        (EpisodeCategory::Safe, _) => String::new(),
-        (worst, 1) => format!("{} ", worst.glyph()),
-        (worst, n) => format!("{} {}/{n} ", worst.glyph(), scores.count(worst)),
-    };
+    let (n, failed, crushed) = (scores.episodes, scores.count(worst), scores.crushed_over_limit);
+    let is_all = crushed == failed || worst != EpisodeCategory::OverLimit;
     let video =
         shown.and_then(|record| relative_link(out, &video_path(&run.run.dir, record.header.id.index())));
-    let label = html! { @if !failed.is_empty() { span.nobreak aria-label=(worst.name()) role="img" { (failed) } } span.nobreak { (text) } @if let Some(crushed) = crushed { br; span.nobreak { (crushed) } } };
+    let label = html! {
+        @if worst != EpisodeCategory::Safe {
+            span.nobreak aria-label=(worst.name()) role="img" { (worst.glyph()) " " @if n > 1 { (failed) "/" (n) " " } }
+        }
+        span.nobreak { (decimal(ratio, 2)) }
+        @if crushed > 0 {
+            br;
+            span.nobreak { @if n > 1 { (crushed) @if is_all { " " } @else { " of them " } } "crushed" }
+        }
+    };
     html! {
         td class=(class(worst)) {
             @match video { Some(video) => a href=(video) { (label) }, None => (label) }

@@ -14,6 +14,7 @@ mod result_sentences;
 
 use std::{
     collections::{BTreeMap, BTreeSet},
+    fmt,
     path::Path,
 };
 
@@ -32,7 +33,7 @@ use softvt_runs::{
 use super::{
     condition_effects::{ConditionEffects, condition_effects, effects_table},
     report_files::MARKDOWN,
-    run_summary::{RunSummary, warnings},
+    run_summary::{RunSummary, caveats},
     tables::{
         bootstrap_table, command_table, crushed_table, deformation_table, grip_table, kappa_table,
         main_table, metric_table, stage_table, task_table,
@@ -66,7 +67,7 @@ pub fn page(runs: &[RunSummary], thumbnails: &Thumbnails, out: &Path) -> String 
                     p.lead { (counted(episodes, "episode")) " in " (counted(runs.len(), "run")) " · seed " (seeds) " · softvt " (env!("CARGO_PKG_VERSION")) }
                     (result_sentences::result_sentences(runs, &effects))
                     (result_sentences::chips(runs))
-                    @for warning in warnings(runs) { p.warning { (warning) } }
+                    @for warning in caveats(runs) { p.warning { (warning) } }
                 }
                 nav aria-label="Contents" {
                     a href="#results" { "Results" }
@@ -126,12 +127,12 @@ fn details(runs: &[RunSummary], out: &Path) -> Markup {
     ];
     html! {
         @for (heading, id, content) in &tables {
-            @if let Some(content) = content { details { summary { (heading) } (table(&format!("{id}-table"), content)) } }
+            @if let Some(content) = content { details { summary { (heading) } (table(format_args!("{id}-table"), content)) } }
         }
         @if let Some(kappas) = kappa_table(runs) {
             details {
                 summary { "Strictness of the limit" }
-                (table("kappa-table", &kappas))
+                (table(format_args!("kappa-table"), &kappas))
                 figure {
                     (kappa_curve::kappa_charts(runs))
                     figcaption { "Safety Success for stricter (left) and looser (right) limits τ = κ D_ref; κ = 0.5 is nominal. Bands are 95 % Wilson intervals." }
@@ -141,7 +142,7 @@ fn details(runs: &[RunSummary], out: &Path) -> Markup {
         details.tasks {
             summary { "Tasks" }
             @for (i, run) in runs.iter().enumerate() {
-                details { summary { (run.name()) } (table(&format!("tasks-{i}"), &task_table(run))) }
+                details { summary { (run.name()) } (table(format_args!("tasks-{i}"), &task_table(run))) }
             }
         }
         details.settings { summary { "Settings" } @for run in runs { (settings(run, out)) } }
@@ -160,26 +161,25 @@ fn section(id: &str, heading: &str, content: &Markup) -> Markup {
 }
 
 /// A heading within a section, with a link to itself. `id` is unique on the page.
-fn subheading(id: &str, heading: &str) -> Markup {
-    html! { h3 id=(id) { (heading) " " a.anchor href=(format!("#{id}")) aria-label=(format!("Link to {heading}")) { "#" } } }
+fn subheading(id: fmt::Arguments, heading: &str) -> Markup {
+    html! { h3 id=(id) { (heading) " " a.anchor href={ "#" (id) } aria-label={ "Link to " (heading) } { "#" } } }
 }
 
-/// Effects of changed factors, per suite.
 fn conditions(effects: &[ConditionEffects]) -> Markup {
     html! {
         @for (i, suite) in effects.iter().enumerate() {
-            @if effects.len() > 1 { (subheading(&format!("suite-{i}"), &format!("{}, {}", suite.suite, suite.method))) }
+            @if effects.len() > 1 { (subheading(format_args!("suite-{i}"), &suite.name())) }
             @if !suite.trends().is_empty() {
                 figure {
                     (conditions::trends(suite))
                     figcaption {
                         "Safety Success with 95 % Wilson intervals, and D/τ of each episode with a line through the medians, over the value of each factor: "
-                        (suite.suite) ", " (suite.method) ". The dashed line is the limit; ref. is the unchanged suite, and its dash the median."
+                        (suite.name()) ". The dashed line is the limit; ref. is the unchanged suite, and its dash the median."
                     }
                 }
             }
             @if let Some(all) = effects_table(std::slice::from_ref(suite)) {
-                (table(&format!("conditions-{i}"), &without_suite(all, suite)))
+                (table(format_args!("conditions-{i}"), &without_suite(all, suite)))
             }
         }
     }
@@ -189,13 +189,13 @@ fn conditions(effects: &[ConditionEffects]) -> Markup {
 fn without_suite(mut table: Table, suite: &ConditionEffects) -> Table {
     table.columns.remove(0);
     table.rows.iter_mut().for_each(|row| drop(row.remove(0)));
-    let caption = format!("{}, {}: {}", suite.suite, suite.method, table.caption);
+    let caption = suite.name() + ": " + &table.caption;
     table.with_caption(caption)
 }
 
 /// A table with its caption. The table scrolls where it is too wide, the caption does not; narrow windows show rows as
 /// cards. Columns of zeros are left out. `id` is unique on the page.
-fn table(id: &str, table: &Table) -> Markup {
+fn table(id: fmt::Arguments, table: &Table) -> Markup {
     let has_index = table.rows.iter().all(|row| row[0].chars().all(|c| c.is_ascii_digit()));
     let is_empty = |at: usize| table.rows.iter().all(|row| row[at] == "0" || row[at] == "–");
     let shown: Vec<(usize, &Heading, &str)> = (table.columns.iter().enumerate())
@@ -259,7 +259,7 @@ fn settings(summary: &RunSummary, out: &Path) -> Markup {
         ("Script", command_line.join(" ")),
         ("Policy", summary.summary.method_label()),
         ("softvt", manifest.softvt.clone()),
-        ("Seed, split", format!("{}, {}", seed_text(manifest), manifest.split.name())),
+        ("Seed, split", seed_text(manifest) + ", " + manifest.split.name()),
         ("Episodes", format!("{} of {}", summary.run.records.len(), manifest.requested_episodes())),
         ("Shifts", list(shifts)),
         ("Settings changed", list(set)),

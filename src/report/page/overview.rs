@@ -14,7 +14,6 @@ use softvt_evaluation::{category::EpisodeCategory, statistics::Rate};
 const HEIGHT: f64 = 26.0;
 const AXIS_HEIGHT: f64 = 16.0;
 
-/// One table for all suites.
 pub(super) fn overview(runs: &[RunSummary]) -> Markup {
     let has_several = runs.iter().any(|run| run.summary.suite != runs[0].summary.suite);
     let count = |category| runs.iter().map(|run| run.summary.scores.count(category)).sum::<usize>();
@@ -37,7 +36,7 @@ pub(super) fn overview(runs: &[RunSummary]) -> Markup {
                 @if let Some(bound) = blind_bound(of_suite) {
                     p.note {
                         "Dashed in " (of_suite[0].summary.suite) ": Safety of the best controller here that keeps one number constant ("
-                        (bound.policy) ", " (format!("{:.0}", bound.safety)) " %)."
+                        (bound.policy) ", " (format_args!("{:.0}", bound.safety)) " %)."
                     }
                 }
             }
@@ -51,7 +50,6 @@ pub(super) fn overview(runs: &[RunSummary]) -> Markup {
 /// The best of the controllers that keep one number constant.
 struct BlindBound {
     policy: String,
-    /// Safety Success, %.
     safety: f64,
 }
 
@@ -116,7 +114,7 @@ fn row(run: &RunSummary, bound: Option<&BlindBound>) -> Markup {
 fn rate(rate: Rate) -> Markup {
     html! {
         (decimal(rate.rate, 0))
-        @if let Some([low, high]) = rate.wilson95 { span.interval { (format!("{low:.0}–{high:.0}")) } }
+        @if let Some([low, high]) = rate.wilson95 { span.interval { (format_args!("{low:.0}–{high:.0}")) } }
     }
 }
 
@@ -125,7 +123,7 @@ fn collapsed(mean: Option<f64>) -> Markup {
         @match mean {
             None => "–",
             Some(mean) => {
-                (format!("{mean:.0}\u{a0}%"))
+                (format_args!("{mean:.0}\u{a0}%"))
                 svg.bar width="100%" height="6" aria-hidden="true" {
                     rect.empty width="100%" height="6" {}
                     rect.over width=(x(0.01 * mean)) height="6" {}
@@ -145,10 +143,10 @@ fn dumbbell(goal: Rate, safety: Option<Rate>, is_over: bool, bound: Option<&Blin
             (vertical_lines("grid", (0..=4).map(|quarter| 0.25 * f64::from(quarter))))
             @if let Some(bound) = bound { (vertical_lines("bound", std::iter::once(0.01 * bound.safety))) }
             @if let Some([low, high]) = safety.and_then(|safety| safety.wilson95) {
-                rect class=(format!("band {verdict}")) x=(x(0.01 * low)) width=(x(0.01 * (high - low))) y="5" height=(HEIGHT - 10.0) {}
+                rect class={ "band " (verdict) } x=(x(0.01 * low)) width=(x(0.01 * (high - low))) y="5" height=(HEIGHT - 10.0) {}
             }
             @if let Some((goal, safety)) = at(goal).zip(safety.and_then(at)) {
-                line class=(format!("gap {verdict}")) x1=(x(safety)) x2=(x(goal)) y1=(middle) y2=(middle) {}
+                line class={ "gap " (verdict) } x1=(x(safety)) x2=(x(goal)) y1=(middle) y2=(middle) {}
             }
             @if let Some(goal) = at(goal) { circle.goal cx=(x(goal)) cy=(middle) r="6.5" {} }
             @if let Some(safety) = safety.and_then(at) { circle class=(verdict) cx=(x(safety)) cy=(middle) r="4" {} }

@@ -1,9 +1,9 @@
-//! What the runs of a page show, in sentences.
+//! Sentences about the results of the runs of a page.
 
 use maud::{Markup, html};
 
 use crate::{condition_effects::ConditionEffects, run_summary::RunSummary};
-use softvt_common::text::counted;
+use softvt_common::text::{counted, decimal};
 use softvt_evaluation::category::EpisodeCategory;
 
 /// Number of episodes below which intervals are called wide.
@@ -21,7 +21,7 @@ pub(super) fn result_sentences(runs: &[RunSummary], effects: &[ConditionEffects]
     }
 }
 
-/// Who reached the goal, who was over the limit, and who was safe.
+/// Sentences about the goal, the limit and drops.
 fn results(runs: &[&RunSummary]) -> Markup {
     let valid: Vec<&&RunSummary> = runs.iter().filter(|run| run.summary.scores.episodes > 0).collect();
     if valid.is_empty() {
@@ -30,6 +30,7 @@ fn results(runs: &[&RunSummary]) -> Markup {
     let goals: Vec<f64> = valid.iter().filter_map(|run| run.summary.scores.goal_success_rate.rate).collect();
     let (low, high) =
         goals.iter().fold((100.0_f64, 0.0_f64), |(low, high), goal| (low.min(*goal), high.max(*goal)));
+    let [least, most] = [low, high].map(|percent| decimal(Some(percent), 0));
     let who = match valid[..] {
         [single] => single.run.manifest.policy.clone(),
         [_, _] => "Both policies".to_owned(),
@@ -43,9 +44,9 @@ fn results(runs: &[&RunSummary]) -> Markup {
     let within: Vec<&&&RunSummary> = valid.iter().filter(|run| is_within(run)).collect();
     html! {
         @if low > 99.99 { (who) " " (verb) " every object to its goal. " }
-        @else if valid.len() == 1 { (who) " reaches the goal in " (format!("{high:.0}")) " % of the episodes. " }
-        @else if format!("{low:.0}") == format!("{high:.0}") { "Goal Success is " (format!("{low:.0}")) " %. " }
-        @else { "Goal Success is " (format!("{low:.0}")) " to " (format!("{high:.0}")) " %. " }
+        @else if valid.len() == 1 { (who) " reaches the goal in " (most) " % of the episodes. " }
+        @else if least == most { "Goal Success is " (least) " %. " }
+        @else { "Goal Success is " (least) " to " (most) " %. " }
         @for run in &over { b.over { (over_limit(run)) } " " }
         @if is_soft && within.len() == valid.len() { b.safe { "No object is over its limit." } }
         @else if let (true, [single]) = (is_soft, &within[..]) { b.safe { (single.run.manifest.policy) } " stays within the limit." }
@@ -69,34 +70,27 @@ fn dropped(run: &RunSummary) -> Option<String> {
 }
 
 /// "expert-binary crushes the object in 10 of 10 episodes (67 % of the volume collapsed)."
-fn over_limit(run: &RunSummary) -> String {
+fn over_limit(run: &RunSummary) -> Markup {
     let over: Vec<_> =
         run.run.records.iter().filter(|record| record.category() == EpisodeCategory::OverLimit).collect();
     let crushed = over.iter().filter(|record| record.crushed_volume_pct().is_some()).count();
-    let (policy, all) = (&run.run.manifest.policy, run.run.records.len());
+    let policy = &run.run.manifest.policy;
+    let all = counted(run.run.records.len(), "episode");
     let volumes: Vec<f64> = over.iter().filter_map(|record| record.collapsed_volume_pct()).collect();
     let mean = volumes.iter().sum::<f64>() / volumes.len().max(1) as f64;
     // Harm in episodes that another category names.
     let elsewhere = run.run.records.iter().filter(|record| {
         record.is_within_limits() == Some(false) && record.category() != EpisodeCategory::OverLimit
     });
-    let elsewhere = match elsewhere.count() {
-        0 => String::new(),
-        count => format!(" In {count} more it is over the limit, and misses the goal or drops the object."),
-    };
-    let placed = match crushed {
-        0 => format!("{policy} is over the limit in {} of {}.", over.len(), counted(all, "episode")),
-        crushed if crushed == over.len() => format!(
-            "{policy} crushes the object in {crushed} of {} ({mean:.0} % of the volume collapsed).",
-            counted(all, "episode")
-        ),
-        crushed => format!(
-            "{policy} is over the limit in {} of {}, and crushes the object in {crushed}.",
-            over.len(),
-            counted(all, "episode")
-        ),
-    };
-    placed + &elsewhere
+    let (over, elsewhere) = (over.len(), elsewhere.count());
+    html! {
+        @if crushed == 0 { (policy) " is over the limit in " (over) " of " (all) "." }
+        @else if crushed == over {
+            (policy) " crushes the object in " (crushed) " of " (all) " (" (decimal(Some(mean), 0)) " % of the volume collapsed)."
+        }
+        @else { (policy) " is over the limit in " (over) " of " (all) ", and crushes the object in " (crushed) "." }
+        @if elsewhere > 0 { " In " (elsewhere) " more it is over the limit, and misses the goal or drops the object." }
+    }
 }
 
 /// The range of Safety and D/τ under the conditions of a suite.
@@ -106,21 +100,21 @@ fn conditions(suite: &ConditionEffects) -> Markup {
         let high = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
         (low, high)
     };
-    let (low, high) = range(suite.effects.iter().filter_map(|effect| effect.safety.rate).collect());
+    let (low, high) = range(suite.effects.iter().filter_map(|effect| effect.point.safety.rate).collect());
     let ratios: Vec<f64> =
         suite.effects.iter().filter_map(|effect| effect.differences.d_over_tau.second).collect();
     let has_ratios = !ratios.is_empty();
     let (least, most) = range(ratios);
     html! {
-        (suite.suite) ", " (suite.method) ": under " (counted(suite.effects.len(), "condition"))
-        @if low.is_finite() && low < high { " Safety is " (format!("{low:.0}")) " to " (format!("{high:.0}")) " %" }
-        @else if low.is_finite() { " Safety stays at " (format!("{low:.0}")) " %" }
-        @if has_ratios { ", and mean D/limit goes from " (format!("{least:.2}")) " to " (format!("{most:.2}")) }
+        (suite.name()) ": under " (counted(suite.effects.len(), "condition"))
+        @if low.is_finite() && low < high { " Safety is " (format_args!("{low:.0}")) " to " (format_args!("{high:.0}")) " %" }
+        @else if low.is_finite() { " Safety stays at " (format_args!("{low:.0}")) " %" }
+        @if has_ratios { ", and mean D/limit goes from " (format_args!("{least:.2}")) " to " (format_args!("{most:.2}")) }
         "."
     }
 }
 
-/// What a reader has to know about the numbers, in a few words each.
+/// Short caveats of the numbers.
 pub(super) fn chips(runs: &[RunSummary]) -> Markup {
     let privileged: Vec<&RunSummary> = runs.iter().filter(|run| run.summary.privileged).collect();
     let episodes = || runs.iter().map(|run| run.summary.scores.episodes);

@@ -54,134 +54,83 @@ fn assert_well_formed(page: &str) {
 }
 
 #[test]
-fn hostile_names_are_escaped() {
+fn hostile_names_and_control_characters_are_escaped() {
     let mut records = episodes(HOSTILE, 4);
     for record in &mut records {
-        (record.header.prompt, record.header.asset) = (HOSTILE.into(), HOSTILE.into());
+        (record.header.prompt, record.header.asset) = (HOSTILE.into(), "bun\u{1b}[2J's".into());
         record.stats.gave_up = Some(HOSTILE.into());
     }
-    let mut run = stored("/nowhere/it's <b>", HOSTILE, records);
-    run.manifest.arguments.push(format!("--name={HOSTILE}"));
+    let mut run = stored("/nowhere/it's <b>\u{1b}[31m", HOSTILE, records);
+    run.manifest.arguments.extend([format!("--name={HOSTILE}"), "--asset=bun\u{1b}[2J's".to_owned()]);
     run.manifest.shifts.push(shift(HOSTILE, 2.0));
     let page = render(vec![run]);
     assert_well_formed(&page);
     assert!(!page.contains("<script") && !page.contains("<b>\""));
-    assert!(page.contains("&lt;script&gt;alert('x')&lt;/script&gt;&quot;&amp;lt; | \\input{x}"));
-    assert!(page.contains("softvt replay '/nowhere/it'\\''s &lt;b&gt;' 0/1"), "quoted for a shell");
-}
-
-#[test]
-fn control_characters_of_names_are_escaped() {
-    let hostile = "bun\u{1b}[2J's";
-    let mut records = episodes("soft", 4);
-    for record in &mut records {
-        (record.header.prompt, record.header.asset) = (hostile.into(), hostile.into());
-    }
-    let mut run = stored("/nowhere/\u{1b}[31mrun", "noop", records);
-    run.manifest.arguments.push(format!("--asset={hostile}"));
-    let page = render(vec![run]);
-    assert_well_formed(&page);
     assert!(!page.contains(|c: char| c.is_control() && c != '\n' && c != '\t'));
-    assert!(page.contains("$'--asset=bun\\x1b[2J\\'s'"), "{page}");
-    assert!(page.contains("softvt replay $'/nowhere/\\x1b[31mrun' 0/1"), "{page}");
+    for part in [
+        "&lt;script&gt;alert('x')&lt;/script&gt;&quot;&amp;lt; | \\input{x}",
+        "$'--asset=bun\\x1b[2J\\'s'",
+        "softvt replay $'/nowhere/it\\'s &lt;b&gt;\\x1b[31m' 0/1",
+    ] {
+        assert!(page.contains(part), "{part} in {page}");
+    }
 }
 
+/// A page with a controller that keeps one number constant, one that crushes, a client in progress, rigid objects,
+/// conditions of two factors, and the picture of an object.
 #[test]
-fn the_page_is_self_contained_and_accessible() {
-    let mut rigid = episodes("rigid", 2);
-    for record in &mut rigid {
+fn a_page_is_self_contained_and_accessible() {
+    let mut blind = stored("runs/a", "drives", episodes("soft", 4));
+    blind.manifest.blind = true;
+    let mut crusher = stored("runs/b", "expert", episodes("soft", 4));
+    for record in &mut crusher.records {
+        record.verdict.safety = false;
+        let of = record.verdict.object_mut();
+        (of.deformation_ok, of.d_peak, of.collapsed_volume_pct) = (Some(false), Some(9.0), Some(67.0));
+    }
+    let mut client = stored("runs/mine", "client", episodes("served", 3));
+    client.manifest.profile = Profile::named("vision");
+    (client.is_finished, client.manifest.episodes, client.manifest.softvt) = (false, 20, "0.0.1".to_owned());
+    let mut rigid = stored("runs/rigid", "pi", episodes("rigid", 2));
+    for record in &mut rigid.records {
         record.verdict.targets = vec![TargetVerdict::default()];
     }
-    let page = render(vec![stored("a", "expert", episodes("soft", 9)), stored("b", "pi", rigid)]);
+    let condition = |dir: &str, change: Option<(&str, f64)>| {
+        let mut run = stored(dir, "pi", episodes("soft", 12));
+        run.manifest.shifts.extend(change.map(|(name, value)| shift(name, value)));
+        run
+    };
+    let runs = summarize_runs(vec![
+        blind,
+        crusher,
+        client,
+        rigid,
+        condition("c/mass", Some(("mass", 2.5))),
+        condition("c/light", Some(("mass", 1.25))),
+        condition("c/soft", Some(("stiffness", 0.1))),
+        condition("c/stiff", Some(("stiffness", 10.0))),
+        condition("c/reference", None),
+    ]);
+    let asset = runs[0].run.records[0].header.asset.clone();
+    let picture = RgbImage::from_pixel(128, 128, image::Rgb([9, 80, 200]));
+    let page = page(&runs, &Thumbnails::from([(asset, picture)]), Path::new("."));
     assert_well_formed(&page);
     for word in ["http:", "https:", "src=\"/", "@import", "url("] {
         assert!(!page.contains(word), "{word}");
     }
-    assert!(
-        page.contains("<html lang=\"en\">")
-            && page.contains("<th scope=\"col\"")
-            && page.contains("<figcaption id=\"results-table\">")
-    );
-    assert!(page.matches("<th scope=\"row\"").count() > 4);
     let drawn: Vec<&str> = page.split("<svg").skip(1).collect();
     let named = |svg: &&str| {
         let (tag, _) = svg.split_once('>').expect("a tag ends");
         tag.contains("aria-hidden=\"true\"") || tag.contains("aria-label=\"")
     };
     assert!(drawn.len() > 4 && drawn.iter().all(named));
-    assert!(page.contains("expert (privileged)") && page.contains("which no robot has"));
-    assert!(page.contains("N/A") && page.contains("D 1.50\u{a0}% is above τ\u{a0}1.00\u{a0}%"));
-    assert!(page.contains("expert is over the limit in 4 of 9 episodes."), "a sentence says so");
-    assert!(page.contains("softvt view x.lua --task 0 --episode 1 --policy expert --seed 11 --out seen"));
-}
-
-#[test]
-fn constant_numbers_and_pictures_of_objects_are_shown() {
-    let mut blind = stored("a", "drives", episodes("soft", 4));
-    blind.manifest.blind = true;
-    let runs = summarize_runs(vec![blind, stored("b", "pi", episodes("soft", 9))]);
-    let asset = runs[0].run.records[0].header.asset.clone();
-    let picture = RgbImage::from_pixel(128, 128, image::Rgb([9, 80, 200]));
-    let page = page(&runs, &Thumbnails::from([(asset, picture)]), Path::new("."));
-    assert_well_formed(&page);
-    assert_eq!(page.matches("<line class=\"bound\"").count(), 2, "beside every policy of the suite");
-    assert!(page.contains("keeps one number constant (drives, 50 %)."), "{page}");
-    assert_eq!(page.matches(">one constant number</span>").count(), 1);
-    assert_eq!(page.matches("<img src=\"data:image/jpeg;base64,").count(), 1);
-    assert!(
-        page.contains("<h3 id=\"failures-0\">soft, drives") && page.contains("href=\"#failures-0\""),
-        "{page}"
-    );
-}
-
-#[test]
-fn an_episode_of_a_policy_server_or_a_client_is_viewed_by_its_actions() {
-    let mut run = stored("runs/mine", "client", episodes("soft", 4));
-    run.manifest.profile = Profile::named("vision");
-    let page = render(vec![run]);
-    assert!(page.contains("--episode 1 --policy runs/mine --seed 11"), "{page}");
-}
-
-/// A run of 20 episodes under a shift, every second of which is unsafe.
-fn shifted(dir: &str, change: Option<(&str, f64)>) -> StoredRun {
-    let mut run = stored(dir, "pi", episodes("soft", 20));
-    run.manifest.shifts.extend(change.map(|(name, value)| shift(name, value)));
-    run
-}
-
-#[test]
-fn trends_have_intervals_and_named_axes() {
-    let page = render(vec![
-        shifted("b", Some(("mass", 2.5))),
-        shifted("c", Some(("mass", 1.25))),
-        shifted("d", Some(("stiffness", 0.1))),
-        shifted("e", Some(("stiffness", 10.0))),
-        shifted("a", None),
-    ]);
-    assert_well_formed(&page);
-    assert!(page.contains("href=\"#conditions\""), "the contents list the section");
-    let (_, figure) = page.split_once("class=\"panels\"").expect("a figure of trends");
-    let (figure, _) = figure.split_once("</figure>").expect("it ends");
-    let panels: Vec<&str> = figure.split("class=\"axes\"").skip(1).collect();
-    let [mass, stiffness] = panels[..] else { panic!("two factors: {figure}") };
-    for panel in panels {
-        // Safety of the reference and at two values, each with an interval, and D/τ of each of 20 episodes.
-        assert_eq!(
-            (panel.matches("whisker").count(), panel.matches("r=\"2.4\"").count()),
-            (3, 60),
-            "{panel}"
-        );
-        assert!(
-            [">0 %<", ">50 %<", ">100 %<", ">ref.<"].iter().all(|label| panel.contains(label)),
-            "{panel}"
-        );
-    }
-    assert!(mass.contains("value of mass<") && mass.find(">1.25<") < mass.find(">2.5<"), "{mass}");
-    assert!(stiffness.contains("value of stiffness, log<"), "{stiffness}");
-    assert!(page.contains("under 4 conditions Safety stays at 50 %"), "{page}");
-    // The reference comes first in the tables and figures.
-    assert!(page.find("pi · mass=1.25") < page.find("pi · mass=2.5"), "{page}");
-    assert!(page.find("<th class=\"text\" scope=\"row\">pi</th>") < page.find("pi · mass=1.25"), "{page}");
+    let (head, body) = page.split_once("</style>").expect("a style sheet");
+    let (head, _) = head.split_once("<style>").expect("a style sheet");
+    let (before, image) = body.split_once("data:image/jpeg;base64,").expect("a picture");
+    let (_, after) = image.split_once('"').expect("it ends");
+    let shown =
+        [head, before, after].concat().replace(env!("CARGO_PKG_VERSION"), "VERSION").replace('<', "\n<");
+    insta::assert_snapshot!("page", shown);
 }
 
 #[test]
@@ -218,15 +167,6 @@ fn pages_of_forty_runs_and_of_none_are_valid() {
     let page = render(vec![empty]);
     assert_well_formed(&page);
     assert!(page.contains("There is no episode yet."));
-}
-
-#[test]
-fn a_run_in_progress_or_of_another_version_is_reported() {
-    let mut run = stored("runs/a", "noop", episodes("soft", 3));
-    (run.is_finished, run.manifest.episodes, run.manifest.softvt) = (false, 20, "0.0.1".to_owned());
-    let page = render(vec![run]);
-    assert!(page.contains("runs/a is not finished: it has 3 of 20 episodes"), "{page}");
-    assert!(page.contains("runs/a was written by softvt 0.0.1"));
 }
 
 /// Relative luminance and contrast as WCAG 2.1 defines them.
@@ -285,27 +225,4 @@ fn the_page_of_looks_states_the_marks_and_colours() {
     for colour in [SAFE, OVER_LIMIT, DROPPED, FAINT] {
         assert!([colour.light, colour.dark].iter().all(|hex| looks.contains(hex)), "{colour:?}");
     }
-}
-
-#[test]
-fn a_sentence_names_who_crushes_and_never_more_than_the_volume_shows() {
-    let run = |policy: &str, collapsed: f64, over: bool| {
-        let mut records = episodes("soft", 4);
-        for record in &mut records {
-            record.verdict.safety = !over;
-            let of = record.verdict.object_mut();
-            (of.deformation_ok, of.d_peak) = (Some(!over), Some(if over { 9.0 } else { 0.5 }));
-            of.collapsed_volume_pct = Some(collapsed);
-        }
-        stored(&format!("runs/{policy}"), policy, records)
-    };
-    let page = render(vec![run("gentle", 0.0, false), run("hard", 3.0, true), run("crusher", 67.0, true)]);
-    assert!(page.contains("All 3 policies bring every object to its goal."), "{page}");
-    assert!(
-        page.contains("crusher crushes the object in 4 of 4 episodes (67 % of the volume collapsed)."),
-        "{page}"
-    );
-    assert!(page.contains("hard is over the limit in 4 of 4 episodes."), "{page}");
-    assert!(page.contains("gentle</b> stays within the limit."), "{page}");
-    assert!(page.contains("9.0\u{a0}× limit, crushed: 67\u{a0}% collapsed"), "{page}");
 }

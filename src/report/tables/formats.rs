@@ -5,7 +5,6 @@ use softvt_common::table::{Heading, Table};
 /// Longest cell, in characters, that stays on one line in LaTeX.
 const MAX_ONE_LINE: usize = 44;
 
-/// A table as markdown.
 pub fn markdown(table: &Table) -> String {
     let row = |cells: &[String]| format!("| {} |\n", join(cells, escape_markdown, " | "));
     let rule = |column: &Heading| if column.is_number { " ---: |" } else { " --- |" };
@@ -14,7 +13,6 @@ pub fn markdown(table: &Table) -> String {
     format!("{}\n\n{}|{rule}\n{body}\n", escape_markdown(&table.caption), row(&headings(table)))
 }
 
-/// A table as LaTeX with booktabs.
 pub fn latex(table: &Table) -> String {
     let row = |cells: &[String]| format!("    {} \\\\\n", join(cells, escape_latex, " & "));
     let columns: String = (0..table.columns.len()).map(|column| latex_column(table, column)).collect();
@@ -41,12 +39,10 @@ fn latex_column(table: &Table, column: usize) -> &'static str {
     }
 }
 
-/// Joins escaped cells.
 fn join(cells: &[String], escape: fn(&str) -> String, separator: &str) -> String {
     cells.iter().map(|cell| escape(cell)).collect::<Vec<_>>().join(separator)
 }
 
-/// Escapes text for markdown.
 pub(crate) fn escape_markdown(text: &str) -> String {
     let letters: Vec<char> = text.chars().collect();
     let mut out = String::with_capacity(text.len());
@@ -68,7 +64,6 @@ pub(crate) fn escape_markdown(text: &str) -> String {
     out.replace("](", "]\\(")
 }
 
-/// Escapes text for LaTeX.
 fn escape_latex(text: &str) -> String {
     let mut out = String::with_capacity(text.len());
     // After the end of a row, a bracket would be read as a length.

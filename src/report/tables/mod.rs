@@ -43,7 +43,6 @@ fn episodes(run: &RunSummary) -> String {
     }
 }
 
-/// A column of numbers of the scores of a run.
 fn score<'a>(heading: impl Into<String>, cell: impl Fn(&GroupScores) -> String + 'a) -> RunColumn<'a> {
     Column::number(heading, move |run: &RunSummary| cell(&run.summary.scores))
 }
@@ -74,7 +73,7 @@ fn soft(runs: &[RunSummary]) -> impl Iterator<Item = &RunSummary> {
     runs.iter().filter(|run| run.is_soft())
 }
 
-/// What a safe grip needs in the suites that state it: "A safe grip needs size in: object_varied."
+/// Needs of a safe grip in the suites that state them: "A safe grip needs size in: object_varied."
 fn needs(runs: &[RunSummary]) -> String {
     let mut suites: BTreeMap<&str, BTreeSet<&str>> = BTreeMap::new();
     for run in runs {
@@ -123,7 +122,6 @@ pub fn main_table(runs: &[RunSummary]) -> Table {
     table_of(runs, &caption, columns).unwrap_or_default()
 }
 
-/// A number of a distribution, with its name.
 type Statistic = (&'static str, fn(&Distribution) -> Option<f64>);
 
 const MEAN: Statistic = ("mean", |of| of.mean);
@@ -245,7 +243,6 @@ pub fn kappa_table(runs: &[RunSummary]) -> Option<Table> {
     )
 }
 
-/// Results per task of a run.
 pub fn task_table(run: &RunSummary) -> Table {
     let score = |heading, cell: fn(&GroupScores) -> String| {
         Column::number(heading, move |task: &TaskScores| cell(&task.scores))
@@ -338,7 +335,6 @@ pub fn bootstrap_table(runs: &[RunSummary]) -> Option<Table> {
     )
 }
 
-/// All tables of some runs, in reading order.
 pub fn all_tables(runs: &[RunSummary]) -> Vec<Table> {
     let optional = [
         effects_table(&condition_effects(runs)),

@@ -1,18 +1,20 @@
-//! Videos and still images of episodes: the third-person camera and the target from nearby on top, the wrist camera
-//! and both fingers below them, and at the bottom plots of the deformation over its limit and of the force. Those of
-//! one episode under several policies are in [`side_by_side`].
+//! Videos and still images of episodes: of one, the third-person camera and the target from nearby on top, the wrist
+//! camera and both fingers below them, and at the bottom plots of the deformation over its limit and of the force; of
+//! one under several policies, a column per policy.
 
 mod plots;
-pub mod side_by_side;
+mod side_by_side;
 
 use std::{
     path::{Path, PathBuf},
     sync::Mutex,
+    time::Duration,
 };
 
 use image::{ImageBuffer, ImageError, Luma, RgbImage};
 
 use plots::{EpisodeCurves, EventMark, PLOTS_HEIGHT, Plots, ratio_colour};
+use side_by_side::Columns;
 use softvt_benchmark::{CONTROL_DT, CONTROL_HZ};
 use softvt_common::episode_id::EpisodeIndex;
 use softvt_common::{
@@ -21,7 +23,7 @@ use softvt_common::{
 };
 use softvt_evaluation::category::EpisodeCategory;
 use softvt_media::{
-    animation::AnimationError,
+    animation::{self, AnimationError},
     canvas::{Canvas, CanvasColours, Rgb8},
     video::{VideoError, VideoWriter},
 };
@@ -43,7 +45,7 @@ const TOP_PANEL: u32 = 512;
 const CLOSE_UP_EDGE: usize = 384;
 /// Edge of the panel of the wrist camera, pixels.
 const WRIST_PANEL: u32 = 384;
-/// Size of the finger panels beside it, pixels: that of the sensors' images.
+/// Size of the finger panels, pixels, as of the sensors' images.
 const FINGER_WIDTH: u32 = 320;
 const FINGER_HEIGHT: u32 = 240;
 /// Size of the panels with the change of the fingers' images, pixels.
@@ -83,7 +85,6 @@ const COLOURS: CanvasColours =
     CanvasColours { ink: TEXT, faint: FAINT, safe: SAFE, harm: HARM, ground: BACKGROUND };
 
 /// Why a video or still image cannot be written.
-#[allow(missing_docs, reason = "the messages describe the variants")]
 #[derive(Debug, thiserror::Error)]
 pub enum EpisodeVideoError {
     #[error(transparent)]
@@ -102,63 +103,73 @@ pub enum EpisodeVideoError {
     Interrupted,
 }
 
-/// What a video says of its episode.
-#[derive(Clone, Debug)]
-pub struct VideoCaption {
-    prompt: String,
-    episode: String,
-    category: EpisodeCategory,
-    /// The result, with the harm and the crushed volume if there is any.
-    verdict: String,
-    /// Time of the drop, s.
-    drop_s: Option<f64>,
-    /// True if the object of the task is soft, and if any target is.
-    is_object_soft: bool,
-    is_soft: bool,
-    is_crushed: bool,
+/// An episode to be drawn.
+pub struct FilmedEpisode<'a> {
+    pub record: &'a EpisodeRecord,
+    pub states: &'a mut StateRecording,
 }
 
-impl VideoCaption {
-    /// Describes a finished episode.
-    pub fn new(record: &EpisodeRecord) -> Self {
-        let (header, verdict) = (&record.header, &record.verdict);
-        let id = &header.id;
-        let collapsed = record.crushed_volume_pct().map(|pct| format!(": {pct:.0} % collapsed"));
-        Self {
-            prompt: header.prompt.clone(),
-            episode: format!("{} · task {} · episode {} · {}", id.suite, id.task, id.episode, header.policy),
-            category: record.category(),
-            verdict: record.result_and_harm() + &collapsed.unwrap_or_default(),
-            drop_s: verdict.drop.map(|event| event.time_s),
-            is_object_soft: verdict.object().soft,
-            is_soft: record.has_soft_target(),
-            is_crushed: record.crushed_volume_pct().is_some(),
-        }
+/// An episode with what its frames need.
+struct Film<'a> {
+    record: &'a EpisodeRecord,
+    recording: &'a StateRecording,
+    sensors: SharedSensors,
+    curves: EpisodeCurves,
+}
+
+impl<'a> Film<'a> {
+    fn new(FilmedEpisode { record, states }: &'a mut FilmedEpisode) -> Result<Self, EpisodeVideoError> {
+        let sensors = SharedSensors::new(&mut states.sensors)?;
+        Ok(Self { record, curves: EpisodeCurves::new(states), recording: states, sensors })
+    }
+
+    fn state(&self, index: usize) -> Result<&'a WorldSnapshot, EpisodeVideoError> {
+        self.recording.frames.get(index).ok_or(EpisodeVideoError::Empty)
+    }
+
+    /// The target from nearby.
+    fn close_up(
+        &self,
+        sensors: &mut Sensors,
+        frame: &WorldSnapshot,
+        edge: usize,
+    ) -> Result<RgbImage, EpisodeVideoError> {
+        let seen = CloseUp { edge, settled: self.state(0)? };
+        Ok(sensors.close_up(frame, self.recording.target, seen)?)
     }
 
     /// Name of the panel that shows the target from nearby.
     fn close_up_name(&self) -> &'static str {
-        if self.is_object_soft { "object, red: beyond stable strain" } else { "object" }
+        if self.record.verdict.object().soft { "object, red: beyond stable strain" } else { "object" }
+    }
+
+    fn is_crushed(&self) -> bool {
+        self.record.crushed_volume_pct().is_some()
+    }
+
+    /// Time of the drop, s.
+    fn drop_s(&self) -> Option<f64> {
+        self.record.verdict.drop.map(|event| event.time_s)
     }
 
     /// The state that shows the result best: the drop, the end of a goal that was missed, or the worst one.
-    fn decisive_state(&self, recording: &StateRecording) -> usize {
-        let last = recording.frames.len().saturating_sub(1);
-        match self.category {
+    fn decisive_moment(&self) -> Moment {
+        let last = self.recording.frames.len().saturating_sub(1);
+        let state = match self.record.category() {
             EpisodeCategory::Dropped => {
-                let seconds = self.drop_s.unwrap_or(f64::MAX) + AFTER_DROP_S;
+                let seconds = self.drop_s().unwrap_or(f64::MAX) + AFTER_DROP_S;
                 ((seconds / CONTROL_DT).round() as usize).min(last)
             }
             EpisodeCategory::GoalMissed => last,
-            _ => worst_state(recording),
-        }
+            _ => self.curves.worst_state,
+        };
+        Moment { state, is_final: true }
     }
 }
 
-/// What a frame shows of an episode: a state of it with the verdict until then, or with the final one.
+/// Content of a frame: a state of the episode with the verdict until then, or with the final one.
 #[derive(Clone, Copy, Debug)]
 struct Moment {
-    /// Index of the state.
     state: usize,
     is_final: bool,
 }
@@ -170,17 +181,12 @@ impl Moment {
         Self { state: index.min(last), is_final: index >= last }
     }
 
-    /// The [decisive state](VideoCaption::decisive_state) with the final verdict.
-    fn decisive(recording: &StateRecording, caption: &VideoCaption) -> Self {
-        Self { state: caption.decisive_state(recording), is_final: true }
-    }
-
     /// The state up to which curves are drawn.
     fn end_of_curves(self) -> usize {
         if self.is_final { usize::MAX } else { self.state }
     }
 
-    /// D over its limit in words, with its colour: that of the state, or the largest one with the final verdict and
+    /// D over its limit in words, with its colour: the state's, or the largest one with the final verdict and
     /// once that is above the limit and D is not.
     fn ratio(self, curves: &EpisodeCurves) -> Option<(String, Rgb8)> {
         let now = *curves.d_over_tau.get(self.state)?;
@@ -191,68 +197,127 @@ impl Moment {
     }
 }
 
-/// Renders every state of a recording and writes the video, one frame per control step. The frames are drawn on up to
-/// `threads` threads; `on_frame` is called after each.
+/// The frames of a video, which are drawn one by one.
+trait FrameSource: Sync {
+    /// Width and height, pixels.
+    fn size(&self) -> [u32; 2];
+
+    /// Number of frames: the states of the longest episode.
+    fn count(&self) -> usize;
+
+    fn frame_at(&self, index: usize) -> Result<RgbImage, EpisodeVideoError>;
+
+    /// The frame with each episode in the state that shows its result best, the final verdict and the whole curves.
+    fn decisive_frame(&self) -> Result<RgbImage, EpisodeVideoError>;
+}
+
+/// The frames of one episode, or of several side by side.
+fn frame_source<'a>(
+    episodes: &'a mut [FilmedEpisode],
+) -> Result<Box<dyn FrameSource + 'a>, EpisodeVideoError> {
+    if episodes.len() == 1 {
+        return Ok(Box::new(Panels::new(Film::new(&mut episodes[0])?)?));
+    }
+    let column = side_by_side::video_column(episodes.len());
+    Ok(Box::new(Columns::new(episodes, column)?))
+}
+
+/// Renders every state of the longest episode and writes the video, one frame per control step. The shorter episodes
+/// hold their last state. The frames are drawn on up to `threads` threads; `on_frame` is called after each.
 ///
 /// If `is_cancelled` becomes true, no file is written.
 ///
 /// # Errors
 /// A state cannot be rendered, the file cannot be written, or the call was cancelled.
 pub fn write_video(
-    recording: &mut StateRecording,
-    caption: &VideoCaption,
+    episodes: &mut [FilmedEpisode],
     path: &Path,
     threads: usize,
     is_cancelled: impl Fn() -> bool + Sync,
-    on_frame: impl FnMut(),
+    mut on_frame: impl FnMut(),
 ) -> Result<(), EpisodeVideoError> {
     if is_cancelled() {
         return Err(EpisodeVideoError::Interrupted);
     }
-    let shared = SharedSensors::new(&mut recording.sensors)?;
-    let recording = &*recording;
-    let context = shared.lend(|sensors| VideoContext::new(sensors, recording, caption))?;
-    let draw = |index: usize| {
-        let moment = Moment::at(recording, index);
-        shared.lend(|sensors| context.frame(sensors, moment))
-    };
-    let frames = FrameList { size: [WIDTH, HEIGHT], count: recording.frames.len(), draw };
-    frames.encode(path, threads, is_cancelled, on_frame)
-}
-
-/// The frames of a video, which are drawn one by one.
-struct FrameList<D> {
-    /// Width and height, pixels.
-    size: [u32; 2],
-    count: usize,
-    /// Draws the frame of an index.
-    draw: D,
-}
-
-impl<D: Fn(usize) -> Result<RgbImage, EpisodeVideoError> + Sync> FrameList<D> {
-    /// Draws the frames on up to `threads` threads and writes the video, in which the last frame is held.
-    fn encode(
-        self,
-        path: &Path,
-        threads: usize,
-        is_cancelled: impl Fn() -> bool + Sync,
-        mut on_frame: impl FnMut(),
-    ) -> Result<(), EpisodeVideoError> {
-        let [width, height] = self.size.map(|edge| edge as usize);
-        let (mut video, mut drawn) = (VideoWriter::new(width, height, CONTROL_HZ)?, 0);
-        let held = (LAST_STATE_S * f64::from(CONTROL_HZ)) as usize;
-        parallel::run_in_order(self.count, threads, &is_cancelled, &self.draw, |_, frame| {
-            video.push(&frame)?;
+    let source = frame_source(episodes)?;
+    let ([width, height], count) = (source.size().map(|edge| edge as usize), source.count());
+    let (mut video, mut drawn) = (VideoWriter::new(width, height, CONTROL_HZ)?, 0);
+    let held = (LAST_STATE_S * f64::from(CONTROL_HZ)) as usize;
+    draw_in_order(
+        count,
+        threads,
+        is_cancelled,
+        |index| source.frame_at(index),
+        |frame| {
             drawn += 1;
-            if drawn == self.count {
-                (0..held).try_for_each(|_| video.push(&frame))?;
-            }
+            let copies = if drawn == count { 1 + held } else { 1 };
+            (0..copies).try_for_each(|_| video.push(&frame))?;
             on_frame();
-            Ok::<_, EpisodeVideoError>(())
-        })?;
-        // A request to stop ends the frames early.
-        if drawn < self.count { Err(EpisodeVideoError::Interrupted) } else { Ok(video.save(path)?) }
-    }
+            Ok(())
+        },
+    )?;
+    Ok(video.save(path)?)
+}
+
+/// Writes a picture of the episodes as a PNG file: each in the state that shows its result best, with the final verdict
+/// and the whole curves.
+///
+/// # Errors
+/// The state cannot be rendered, or the file cannot be written.
+pub fn write_decisive_frame(episodes: &mut [FilmedEpisode], path: &Path) -> Result<(), EpisodeVideoError> {
+    let frame = frame_source(episodes)?.decisive_frame()?;
+    Ok(replace(path, encode_png(&frame)?)?)
+}
+
+/// Width of a column of an animation, pixels, and the control steps between two of its frames.
+const ANIMATION_COLUMN: u32 = 320;
+const ANIMATION_STEPS: usize = 4;
+/// Speed of an animation over the episode's.
+const ANIMATION_SPEED: f64 = 2.0;
+
+/// Renders the episodes side by side as an animated PNG file for web pages, at twice their speed, in which the last
+/// state is held. Programs without animations show the picture of [`write_decisive_frame`]. Other arguments are those
+/// of [`write_video`].
+pub fn write_animation(
+    episodes: &mut [FilmedEpisode],
+    path: &Path,
+    threads: usize,
+    is_cancelled: impl Fn() -> bool + Sync,
+) -> Result<(), EpisodeVideoError> {
+    let source = Columns::new(episodes, ANIMATION_COLUMN)?;
+    let last = source.count().saturating_sub(1);
+    let indices: Vec<usize> = (0..last).step_by(ANIMATION_STEPS).chain([last]).collect();
+    let mut frames = Vec::new();
+    draw_in_order(
+        indices.len(),
+        threads,
+        is_cancelled,
+        |number| source.frame_at(indices[number]),
+        |frame| {
+            frames.push(frame);
+            Ok(())
+        },
+    )?;
+    let each = Duration::from_secs_f64(ANIMATION_STEPS as f64 * CONTROL_DT / ANIMATION_SPEED);
+    let still = source.decisive_frame()?;
+    Ok(replace(path, animation::encode(&still, &frames, each, Duration::from_secs_f64(LAST_STATE_S))?)?)
+}
+
+/// Draws numbered images on up to `threads` threads, and passes them to `take` in their order.
+fn draw_in_order<T: Send>(
+    count: usize,
+    threads: usize,
+    is_cancelled: impl Fn() -> bool + Sync,
+    draw: impl Fn(usize) -> Result<T, EpisodeVideoError> + Sync,
+    mut take: impl FnMut(T) -> Result<(), EpisodeVideoError>,
+) -> Result<(), EpisodeVideoError> {
+    let mut taken = 0;
+    parallel::run_in_order(count, threads, is_cancelled, draw, |_, image| {
+        taken += 1;
+        take(image)
+    })?;
+    // A request to stop ends the images early.
+    if taken < count { Err(EpisodeVideoError::Interrupted) } else { Ok(()) }
 }
 
 /// Sensors of several threads, which share their meshes and have their own working memory.
@@ -278,62 +343,59 @@ impl SharedSensors {
     }
 }
 
-/// Writes a picture of an episode as a PNG file: the state that shows its result best, with the final verdict
-/// and the whole curves.
-///
-/// # Errors
-/// The state cannot be rendered, or the file cannot be written.
-pub fn write_decisive_frame(
-    recording: &mut StateRecording,
-    caption: &VideoCaption,
-    path: &Path,
-) -> Result<(), EpisodeVideoError> {
-    recording.sensors.render_scene()?;
-    let mut sensors = recording.sensors.clone();
-    let moment = Moment::decisive(recording, caption);
-    let frame = VideoContext::new(&mut sensors, recording, caption)?.frame(&mut sensors, moment)?;
-    Ok(replace(path, encode_png(&frame)?)?)
-}
-
-/// Everything that all frames of a video share.
-struct VideoContext<'a> {
-    recording: &'a StateRecording,
-    caption: &'a VideoCaption,
-    curves: EpisodeCurves,
+/// The frames of one episode.
+struct Panels<'a> {
+    film: Film<'a>,
     events: Vec<EventMark>,
     /// The images of the fingers in the settled state.
     fingers_at_rest: Vec<RgbImage>,
 }
 
-impl<'a> VideoContext<'a> {
-    fn new(
-        sensors: &mut Sensors,
-        recording: &'a StateRecording,
-        caption: &'a VideoCaption,
-    ) -> Result<Self, EpisodeVideoError> {
-        let settled = recording.frames.first().ok_or(EpisodeVideoError::Empty)?;
-        let fingers_at_rest =
-            sensors.tactile_readings(settled)?.into_iter().map(|reading| reading.image).collect();
-        let curves = EpisodeCurves::new(recording);
-        Ok(Self { recording, caption, curves, events: events(recording, caption), fingers_at_rest })
+impl FrameSource for Panels<'_> {
+    fn size(&self) -> [u32; 2] {
+        STILL_SIZE
     }
 
-    fn frame(&self, sensors: &mut Sensors, moment: Moment) -> Result<RgbImage, EpisodeVideoError> {
+    fn count(&self) -> usize {
+        self.film.recording.frames.len()
+    }
+
+    fn frame_at(&self, index: usize) -> Result<RgbImage, EpisodeVideoError> {
+        self.frame(Moment::at(self.film.recording, index))
+    }
+
+    fn decisive_frame(&self) -> Result<RgbImage, EpisodeVideoError> {
+        self.frame(self.film.decisive_moment())
+    }
+}
+
+impl<'a> Panels<'a> {
+    fn new(film: Film<'a>) -> Result<Self, EpisodeVideoError> {
+        let settled = film.state(0)?;
+        let at_rest = film.sensors.lend(|sensors| sensors.tactile_readings(settled))?;
+        let fingers_at_rest = at_rest.into_iter().map(|reading| reading.image).collect();
+        Ok(Self { events: events(&film), film, fingers_at_rest })
+    }
+
+    fn frame(&self, moment: Moment) -> Result<RgbImage, EpisodeVideoError> {
+        let Film { recording, sensors, curves, .. } = &self.film;
         let mut canvas = Canvas::new(WIDTH, HEIGHT, BACKGROUND);
-        let frame = self.recording.frames.get(moment.state).ok_or(EpisodeVideoError::Empty)?;
-        self.draw_cameras(&mut canvas, sensors, frame)?;
-        self.draw_fingers(&mut canvas, sensors, frame)?;
+        let frame = self.film.state(moment.state)?;
+        sensors.lend(|sensors| {
+            self.draw_cameras(&mut canvas, sensors, frame)?;
+            self.draw_fingers(&mut canvas, sensors, frame)
+        })?;
         let (x, y) = (WRIST_PANEL as f32 + MARGIN, (TOP_PANEL + FINGER_HEIGHT) as f32);
-        Badge::new(self.recording, self.caption, &self.curves, moment).draw(&mut canvas, x, y + 20.0, 16.0);
-        if let Some((text, colour)) = moment.ratio(&self.curves) {
+        Badge::new(&self.film, moment).draw(&mut canvas, x, y + 20.0, 16.0);
+        if let Some((text, colour)) = moment.ratio(curves) {
             canvas.write(&text, x, y + 92.0, 24.0, colour);
         }
-        draw_caption(&mut canvas, self.caption, moment);
+        draw_caption(&mut canvas, self.film.record, moment);
         let plots = Plots {
-            episodes: std::slice::from_ref(&self.curves),
+            episodes: vec![curves],
             names: &[],
             events: &self.events,
-            steps: self.recording.frames.len().saturating_sub(1),
+            steps: recording.frames.len().saturating_sub(1),
             unit: PLOT_UNIT,
         };
         let top = TOP_PANEL + WRIST_PANEL + CAPTION_HEIGHT;
@@ -353,10 +415,9 @@ impl<'a> VideoContext<'a> {
         };
         canvas.place(&seen(sensors, STANDARD_CAMERAS[0], TOP_PANEL)?, 0, 0);
         draw_label(canvas, "third person", 0, 0, PANEL_NAME_SIZE);
-        let closely = CloseUp { edge: CLOSE_UP_EDGE, settled: &self.recording.frames[0] };
-        let close_up = sensors.close_up(frame, self.recording.target, closely)?;
+        let close_up = self.film.close_up(sensors, frame, CLOSE_UP_EDGE)?;
         canvas.place(&resize(&close_up, TOP_PANEL, TOP_PANEL), TOP_PANEL, 0);
-        draw_label(canvas, self.caption.close_up_name(), TOP_PANEL, 0, PANEL_NAME_SIZE);
+        draw_label(canvas, self.film.close_up_name(), TOP_PANEL, 0, PANEL_NAME_SIZE);
         canvas.place(&seen(sensors, STANDARD_CAMERAS[1], WRIST_PANEL)?, 0, TOP_PANEL);
         draw_label(canvas, "wrist", 0, TOP_PANEL, PANEL_NAME_SIZE);
         Ok(())
@@ -410,8 +471,9 @@ fn first_over_limit(recording: &StateRecording, index: usize) -> Option<usize> {
     recording.deformation.iter().take(index + 1).position(|of| of.is_some_and(|of| of.is_over()))
 }
 
-/// When the object was grasped, released and dropped.
-fn events(recording: &StateRecording, caption: &VideoCaption) -> Vec<EventMark> {
+/// Times at which the object was grasped, released and dropped.
+fn events(film: &Film) -> Vec<EventMark> {
+    let recording = film.recording;
     let is_held = |frame: &WorldSnapshot| (0..2).all(|side| pad_force(frame, side) > 0.0);
     let held = recording.frames.iter().position(is_held);
     let released = recording.frames.iter().rposition(is_held).map(|last| last + 1);
@@ -419,8 +481,8 @@ fn events(recording: &StateRecording, caption: &VideoCaption) -> Vec<EventMark> 
     let time = |state: usize| state as f64 * CONTROL_DT;
     let all = [
         ("grasp", held.map(time)),
-        ("release", released.filter(|_| !is_kept && caption.drop_s.is_none()).map(time)),
-        ("drop", caption.drop_s),
+        ("release", released.filter(|_| !is_kept && film.drop_s().is_none()).map(time)),
+        ("drop", film.drop_s()),
     ];
     all.into_iter().filter_map(|(name, time_s)| Some(EventMark { name, time_s: time_s? })).collect()
 }
@@ -432,30 +494,26 @@ struct Badge {
 }
 
 impl Badge {
-    /// The verdict so far, or the final one.
-    fn new(
-        recording: &StateRecording,
-        caption: &VideoCaption,
-        curves: &EpisodeCurves,
-        moment: Moment,
-    ) -> Self {
+    fn new(film: &Film, moment: Moment) -> Self {
+        let Film { record, recording, curves, .. } = film;
         if moment.is_final {
-            let colour = match caption.category {
-                _ if caption.is_crushed => HARM,
+            let colour = match record.category() {
+                _ if film.is_crushed() => HARM,
                 EpisodeCategory::Safe => SAFE,
                 EpisodeCategory::OverLimit => HARM,
                 EpisodeCategory::Dropped | EpisodeCategory::Slipped => DROPPED,
                 EpisodeCategory::GoalMissed | EpisodeCategory::NotJudged | EpisodeCategory::Invalid => MISSED,
             };
-            return Self { text: caption.verdict.clone(), colour };
+            let collapsed = record.crushed_volume_pct().map(|pct| format!(": {pct:.0} % collapsed"));
+            return Self { text: record.result_and_harm() + &collapsed.unwrap_or_default(), colour };
         }
         let now_s = moment.state as f64 * CONTROL_DT;
-        let is_crushed = caption.is_crushed && moment.state >= curves.worst_state;
+        let is_crushed = film.is_crushed() && moment.state >= curves.worst_state;
         let over = first_over_limit(recording, moment.state).map(|at| match is_crushed {
             true => "crushed".to_owned(),
             false => format!("over the limit at {:.2} s", at as f64 * CONTROL_DT),
         });
-        let dropped = caption.drop_s.filter(|at| *at <= now_s).map(|at| format!("dropped at {at:.2} s"));
+        let dropped = film.drop_s().filter(|at| *at <= now_s).map(|at| format!("dropped at {at:.2} s"));
         let has_limit = recording.deformation.iter().flatten().any(|of| of.tau_pct.is_some());
         let (text, colour) = match (over, dropped) {
             (Some(over), Some(dropped)) => {
@@ -463,7 +521,7 @@ impl Badge {
             }
             (Some(over), None) => (over, HARM),
             (None, Some(dropped)) => (dropped, DROPPED),
-            (None, None) if !caption.is_soft => ("not dropped so far".to_owned(), SAFE),
+            (None, None) if !record.has_soft_target() => ("not dropped so far".to_owned(), SAFE),
             (None, None) if !has_limit => ("no limit of the deformation".to_owned(), FAINT),
             (None, None) => ("within the limit so far".to_owned(), SAFE),
         };
@@ -489,11 +547,18 @@ fn draw_label(canvas: &mut Canvas, name: &str, x: u32, y: u32, size: f32) {
     canvas.write(name, x + 16.0, y + 8.0 + size, size, [255, 255, 255]);
 }
 
-fn draw_caption(canvas: &mut Canvas, caption: &VideoCaption, moment: Moment) {
+fn draw_caption(canvas: &mut Canvas, record: &EpisodeRecord, moment: Moment) {
     let top = (TOP_PANEL + WRIST_PANEL) as f32;
-    canvas.write(&caption.prompt, MARGIN, top + 28.0, 20.0, TEXT);
+    canvas.write(&record.header.prompt, MARGIN, top + 28.0, 20.0, TEXT);
+    let (place, policy) = (place(record), &record.header.policy);
     let time_s = moment.state as f64 * CONTROL_DT;
-    canvas.write(&format!("{} · {time_s:.2} s", caption.episode), MARGIN, top + 52.0, 16.0, FAINT);
+    canvas.write(&format!("{place} · {policy} · {time_s:.2} s"), MARGIN, top + 52.0, 16.0, FAINT);
+}
+
+/// Suite, task and episode.
+pub(crate) fn place(record: &EpisodeRecord) -> String {
+    let id = &record.header.id;
+    format!("{} · task {} · episode {}", id.suite, id.task, id.episode)
 }
 
 /// Path of an episode's video in a run folder.
@@ -543,7 +608,7 @@ pub fn write_stills(
 ) -> Result<Vec<PathBuf>, EpisodeVideoError> {
     let shared = SharedSensors::new(&mut recording.sensors)?;
     let (recording, cameras) = (&*recording, shared.original.cameras().to_vec());
-    // In each state the images of every camera, then the target from nearby, then those of the fingers.
+    // In each state the images of every camera, then the target from nearby, then the images of the fingers.
     let per_state = cameras.len() + 2;
     let close_up_edge = if is_full_size { OTHER_FULL_SIZE } else { CLOSE_UP_EDGE };
     let draw = |job: usize| {
@@ -576,8 +641,8 @@ pub fn write_stills(
         }
         Ok(drawn)
     };
-    let (mut written, mut done, jobs) = (Vec::new(), 0, states.len() * per_state);
-    parallel::run_in_order(jobs, threads, &is_cancelled, draw, |_, stills: Vec<Still>| {
+    let mut written = Vec::new();
+    draw_in_order(states.len() * per_state, threads, &is_cancelled, draw, |stills| {
         for Still { path, png } in stills {
             if is_cancelled() {
                 return Err(EpisodeVideoError::Interrupted);
@@ -585,14 +650,11 @@ pub fn write_stills(
             replace(&path, png)?;
             written.push(path);
         }
-        done += 1;
         Ok(())
     })?;
-    // A request to stop ends the jobs early.
-    if done < jobs { Err(EpisodeVideoError::Interrupted) } else { Ok(written) }
+    Ok(written)
 }
 
-/// An encoded image and its place.
 struct Still {
     path: PathBuf,
     png: Vec<u8>,

@@ -22,30 +22,27 @@ const PLOT_TOP: f32 = 24.0;
 const PLOT_BOTTOM: f32 = 20.0;
 /// Width of the names between the two plots, units.
 const LEGEND: f32 = 138.0;
-/// Share of the width without names that the plot of D over τ has; the rest is that of the force.
+/// Share of the width without names that the plot of D over τ has; the force has the rest.
 const D_PLOT_SHARE: f32 = 0.56;
 /// Letters of a name between the plots.
 const NAME_LETTERS: usize = 18;
 /// Largest numbers of intervals of the axes.
 const FORCE_TICKS: usize = 4;
 const TIME_TICKS: usize = 5;
-/// Colour of D over τ.
 fn ratio_tone(ratio: f64) -> Tone {
     if ratio > 1.0 { Tone::Harm } else { Tone::Safe }
 }
 
-/// Colour of D over τ in a video.
 pub(super) fn ratio_colour(ratio: f64) -> Rgb8 {
     COLOURS.of(ratio_tone(ratio))
 }
 
-/// What is plotted of an episode, by state.
+/// Values of the plots of an episode, by state.
 pub(super) struct EpisodeCurves {
     /// D over τ; empty for rigid targets and without a limit.
     pub(super) d_over_tau: Vec<f64>,
     /// The larger normal force of the two pads, N.
     pub(super) pad_force_n: Vec<f64>,
-    /// Index of the [worst state](worst_state).
     pub(super) worst_state: usize,
     is_rigid: bool,
 }
@@ -79,9 +76,8 @@ pub(super) struct EventMark {
     pub(super) time_s: f64,
 }
 
-/// The plots of one or several episodes.
 pub(super) struct Plots<'a> {
-    pub(super) episodes: &'a [EpisodeCurves],
+    pub(super) episodes: Vec<&'a EpisodeCurves>,
     /// Names of the episodes, shown if there are several.
     pub(super) names: &'a [&'a str],
     /// Events, of which those up to the last state of the curves are shown.
@@ -119,14 +115,14 @@ impl Plots<'_> {
     /// The names with the dashes of their curves, in the colour of the largest D so far.
     fn names(&self, [left, top]: [f32; 2], index: usize) -> Vec<Element> {
         let px = |units: f32| units * self.unit;
-        let name = |(dash, (name, episode)): (usize, (&&str, &EpisodeCurves))| {
+        let name = |(dash, (name, episode)): (usize, (&&str, &&EpisodeCurves))| {
             let (y, tone) = (top + px(20.0) * dash as f32, episode.tone_until(index));
             let (from, to) = (at(left, y - px(4.0)), at(left + px(26.0), y - px(4.0)));
             let (place, font) = (at(left + px(30.0), y), Font::Name(tone));
             let name = styled_text(place, Anchor::Start, font, shortened(name, NAME_LETTERS));
             [line(from, to, Stroke::Curve { tone, dash }), name]
         };
-        self.names.iter().zip(self.episodes).enumerate().flat_map(name).collect()
+        self.names.iter().zip(&self.episodes).enumerate().flat_map(name).collect()
     }
 
     fn d_plot(&self, frame: &Frame, index: usize) -> Vec<Element> {
@@ -166,7 +162,6 @@ impl Plots<'_> {
         Chart { title: "pad force, N".to_owned(), x: self.time_axis(), y, marks }.elements(frame)
     }
 
-    /// Time, s.
     fn time_axis(&self) -> Axis {
         let mut axis = Axis::linear("", 0.0, self.steps.max(1) as f64 * CONTROL_DT, TIME_TICKS);
         axis.ticks.iter_mut().for_each(|tick| tick.tone = Tone::Faint);

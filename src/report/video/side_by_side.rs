@@ -3,21 +3,17 @@
 //!
 //! The shorter episodes hold their last state until the longest ends.
 
-use std::{path::Path, time::Duration};
-
 use image::RgbImage;
 
 use super::{
-    BACKGROUND, Badge, CLOSE_UP_EDGE, EpisodeVideoError, FAINT, FrameList, LAST_STATE_S, Moment,
-    SharedSensors, TEXT, VideoCaption, draw_label,
-    plots::{EpisodeCurves, PLOTS_HEIGHT, Plots},
+    BACKGROUND, Badge, CLOSE_UP_EDGE, EpisodeVideoError, FAINT, Film, FilmedEpisode, FrameSource, Moment,
+    TEXT, draw_label, place,
+    plots::{PLOTS_HEIGHT, Plots},
 };
 use softvt_benchmark::CONTROL_DT;
-use softvt_common::{files::replace, parallel, text::shortened};
-use softvt_media::{animation, canvas::Canvas};
-use softvt_rollout::{CloseUp, StateRecording};
-use softvt_runs::record::EpisodeRecord;
-use softvt_sensing::camera::{encode_png, resize};
+use softvt_common::text::shortened;
+use softvt_media::canvas::Canvas;
+use softvt_sensing::camera::resize;
 
 /// Width of a column in units of the layout, in which the sizes of texts and plots are stated.
 const COLUMN: f32 = 320.0;
@@ -30,106 +26,8 @@ const NAME_SIZE: f32 = 17.0;
 const BADGE_SIZE: f32 = 14.0;
 const TEXT_SIZE: f32 = 13.0;
 const PANEL_NAME_SIZE: f32 = 12.0;
-/// One episode under one of several policies.
-pub struct PolicyEpisode {
-    policy: String,
-    /// Suite, task and episode.
-    place: String,
-    caption: VideoCaption,
-    recording: StateRecording,
-}
 
-impl PolicyEpisode {
-    /// A finished episode with its states.
-    pub fn new(record: &EpisodeRecord, recording: StateRecording) -> Self {
-        let id = &record.header.id;
-        Self {
-            policy: record.header.policy.clone(),
-            place: format!("{} · task {} · episode {}", id.suite, id.task, id.episode),
-            caption: VideoCaption::new(record),
-            recording,
-        }
-    }
-
-    fn curves(&self) -> EpisodeCurves {
-        EpisodeCurves::new(&self.recording)
-    }
-}
-
-/// Number of states of the longest episode, each of which is a frame of the video.
-pub fn state_count(episodes: &[PolicyEpisode]) -> usize {
-    episodes.iter().map(|episode| episode.recording.frames.len()).max().unwrap_or(0)
-}
-
-/// Renders every state of the longest episode and writes the video, one frame per control step. The frames are drawn on
-/// up to `threads` threads; `on_frame` is called after each.
-///
-/// If `is_cancelled` becomes true, no file is written.
-///
-/// # Errors
-/// A state cannot be rendered, the file cannot be written, or the call was cancelled.
-pub fn write_video(
-    episodes: &mut [PolicyEpisode],
-    path: &Path,
-    threads: usize,
-    is_cancelled: impl Fn() -> bool + Sync,
-    on_frame: impl FnMut(),
-) -> Result<(), EpisodeVideoError> {
-    let count = state_count(episodes);
-    let context = FrameContext::new(episodes, video_column(episodes.len()))?;
-    let frames = FrameList { size: context.layout.size(), count, draw: |index| context.frame_at(index) };
-    frames.encode(path, threads, is_cancelled, on_frame)
-}
-
-/// Writes a picture of the episodes as a PNG file: each in the state that shows its result best, with the final verdict
-/// and the whole curves.
-///
-/// # Errors
-/// A state cannot be rendered, or the file cannot be written.
-pub fn write_decisive_frame(episodes: &mut [PolicyEpisode], path: &Path) -> Result<(), EpisodeVideoError> {
-    let column = video_column(episodes.len());
-    let frame = FrameContext::new(episodes, column)?.decisive_frame()?;
-    Ok(replace(path, encode_png(&frame)?)?)
-}
-
-/// Width of a column of an animation, pixels, and the control steps between two of its frames.
-const ANIMATION_COLUMN: u32 = 320;
-const ANIMATION_STEPS: usize = 4;
-/// Speed of an animation over that of the episode.
-const ANIMATION_SPEED: f64 = 2.0;
-
-/// Renders the episodes as an animated PNG file for web pages, at twice their speed, in which the last state is held.
-/// Where pictures do not move, the file shows the picture of [`write_decisive_frame`]. Other arguments and errors are
-/// those of [`write_video`].
-///
-/// # Errors
-/// As [`write_video`].
-pub fn write_animation(
-    episodes: &mut [PolicyEpisode],
-    path: &Path,
-    threads: usize,
-    is_cancelled: impl Fn() -> bool + Sync,
-) -> Result<(), EpisodeVideoError> {
-    let last = state_count(episodes).saturating_sub(1);
-    let indices: Vec<usize> = (0..last).step_by(ANIMATION_STEPS).chain([last]).collect();
-    let context = FrameContext::new(episodes, ANIMATION_COLUMN)?;
-    let mut frames = Vec::new();
-    let draw = |number: usize| context.frame_at(indices[number]);
-    parallel::run_in_order(indices.len(), threads, &is_cancelled, draw, |_, frame| {
-        frames.push(frame);
-        Ok::<_, EpisodeVideoError>(())
-    })?;
-    // A request to stop ends the frames early.
-    if frames.len() < indices.len() {
-        return Err(EpisodeVideoError::Interrupted);
-    }
-    let each = Duration::from_secs_f64(ANIMATION_STEPS as f64 * CONTROL_DT / ANIMATION_SPEED);
-    let still = context.decisive_frame()?;
-    Ok(replace(path, animation::encode(&still, &frames, each, Duration::from_secs_f64(LAST_STATE_S))?)?)
-}
-
-/// Width of a column of a video, pixels.
-fn video_column(policies: usize) -> u32 {
+pub(super) fn video_column(policies: usize) -> u32 {
     match policies {
         0..=2 => 512,
         3 => 432,
@@ -137,15 +35,12 @@ fn video_column(policies: usize) -> u32 {
     }
 }
 
-/// Everything that all frames share.
-struct FrameContext<'a> {
-    episodes: &'a [PolicyEpisode],
-    sensors: Vec<SharedSensors>,
+/// The frames of one episode under several policies.
+pub(super) struct Columns<'a> {
+    films: Vec<Film<'a>>,
     layout: Layout,
-    curves: Vec<EpisodeCurves>,
 }
 
-/// Sizes of a frame.
 #[derive(Clone, Copy)]
 struct Layout {
     columns: u32,
@@ -179,45 +74,50 @@ impl Layout {
     }
 }
 
-impl<'a> FrameContext<'a> {
-    fn new(episodes: &'a mut [PolicyEpisode], column: u32) -> Result<Self, EpisodeVideoError> {
-        let sensors = episodes.iter_mut().map(|episode| SharedSensors::new(&mut episode.recording.sensors));
-        let sensors = sensors.collect::<Result<_, _>>()?;
-        let episodes = &*episodes;
-        Ok(Self {
-            layout: Layout { columns: episodes.len() as u32, column },
-            curves: episodes.iter().map(PolicyEpisode::curves).collect(),
-            episodes,
-            sensors,
-        })
+impl FrameSource for Columns<'_> {
+    fn size(&self) -> [u32; 2] {
+        self.layout.size()
     }
 
-    /// The frame of the state `index` of the longest episode.
+    fn count(&self) -> usize {
+        self.films.iter().map(|film| film.recording.frames.len()).max().unwrap_or(0)
+    }
+
     fn frame_at(&self, index: usize) -> Result<RgbImage, EpisodeVideoError> {
-        let moments: Vec<Moment> =
-            self.episodes.iter().map(|episode| Moment::at(&episode.recording, index)).collect();
-        self.frame(&moments, index, &format!("{:.2} s", index as f64 * CONTROL_DT))
+        let at = |film: &Film| Moment::at(film.recording, index);
+        self.frame(at, index, &format!("{:.2} s", index as f64 * CONTROL_DT))
     }
 
     fn decisive_frame(&self) -> Result<RgbImage, EpisodeVideoError> {
-        let decisive = |PolicyEpisode { recording, caption, .. }: &_| Moment::decisive(recording, caption);
-        let moments: Vec<Moment> = self.episodes.iter().map(decisive).collect();
-        self.frame(&moments, usize::MAX, "the moment of the result")
+        self.frame(|film| film.decisive_moment(), usize::MAX, "the moment of the result")
+    }
+}
+
+impl<'a> Columns<'a> {
+    /// Columns of this width, pixels.
+    pub(super) fn new(episodes: &'a mut [FilmedEpisode], column: u32) -> Result<Self, EpisodeVideoError> {
+        let films: Vec<Film> = episodes.iter_mut().map(Film::new).collect::<Result<_, _>>()?;
+        Ok(Self { layout: Layout { columns: films.len() as u32, column }, films })
     }
 
     /// Draws a moment of each episode, and the curves up to the state `index`.
-    fn frame(&self, moments: &[Moment], index: usize, when: &str) -> Result<RgbImage, EpisodeVideoError> {
+    fn frame(
+        &self,
+        moment: impl Fn(&Film) -> Moment,
+        index: usize,
+        when: &str,
+    ) -> Result<RgbImage, EpisodeVideoError> {
         let [width, height] = self.layout.size();
         let mut canvas = Canvas::new(width, height, BACKGROUND);
-        for (column, moment) in moments.iter().enumerate() {
-            self.draw_column(&mut canvas, column, *moment)?;
+        for (column, film) in self.films.iter().enumerate() {
+            self.draw_column(&mut canvas, column, film, moment(film))?;
         }
-        let names: Vec<&str> = self.episodes.iter().map(|episode| episode.policy.as_str()).collect();
+        let names: Vec<&str> = self.films.iter().map(|film| film.record.header.policy.as_str()).collect();
         let plots = Plots {
-            episodes: &self.curves,
+            episodes: self.films.iter().map(|film| &film.curves).collect(),
             names: &names,
             events: &[],
-            steps: state_count(self.episodes).saturating_sub(1),
+            steps: self.count().saturating_sub(1),
             unit: self.layout.px(1.0),
         };
         plots.draw(&mut canvas, self.layout.plots_top(), width as f32, index);
@@ -229,46 +129,38 @@ impl<'a> FrameContext<'a> {
         &self,
         canvas: &mut Canvas,
         column: usize,
+        film: &Film,
         moment: Moment,
     ) -> Result<(), EpisodeVideoError> {
-        let PolicyEpisode { recording, caption, policy, .. } = &self.episodes[column];
-        let frame = recording.frames.get(moment.state).ok_or(EpisodeVideoError::Empty)?;
+        let frame = film.state(moment.state)?;
         let (layout, edge) = (self.layout, self.layout.column);
         let left = column as u32 * edge;
         let (x, px) = (left as f32 + layout.px(10.0), |units| layout.px(units));
-        canvas.write(&shortened(policy, 34), x, px(20.0), px(NAME_SIZE), TEXT);
-        Badge::new(recording, caption, &self.curves[column], moment).draw(
-            canvas,
-            x,
-            px(28.0),
-            px(BADGE_SIZE),
-        );
-        let settled = recording.frames.first().ok_or(EpisodeVideoError::Empty)?;
-        let seen = CloseUp { edge: CLOSE_UP_EDGE.min(edge as usize), settled };
-        let close_up =
-            self.sensors[column].lend(|sensors| sensors.close_up(frame, recording.target, seen))?;
+        canvas.write(&shortened(&film.record.header.policy, 34), x, px(20.0), px(NAME_SIZE), TEXT);
+        Badge::new(film, moment).draw(canvas, x, px(28.0), px(BADGE_SIZE));
+        let seen_edge = CLOSE_UP_EDGE.min(edge as usize);
+        let close_up = film.sensors.lend(|sensors| film.close_up(sensors, frame, seen_edge))?;
         canvas.place(&resize(&close_up, edge, edge), left, layout.panel_top());
         if column == 0 {
-            draw_label(canvas, caption.close_up_name(), left, layout.panel_top(), px(PANEL_NAME_SIZE));
+            draw_label(canvas, film.close_up_name(), left, layout.panel_top(), px(PANEL_NAME_SIZE));
         }
-        let force = self.curves[column].pad_force_n.get(moment.state).copied().unwrap_or(0.0);
+        let force = film.curves.pad_force_n.get(moment.state).copied().unwrap_or(0.0);
         let y = layout.reading_top() + px(19.0);
         let end = canvas.write(&format!("pad force {force:.2} N"), x, y, px(TEXT_SIZE), TEXT);
-        if let Some((text, colour)) = moment.ratio(&self.curves[column]) {
+        if let Some((text, colour)) = moment.ratio(&film.curves) {
             canvas.write(&text, end + px(18.0), y, px(TEXT_SIZE), colour);
         }
         Ok(())
     }
 
     fn draw_caption(&self, canvas: &mut Canvas, when: &str) {
-        let Some(PolicyEpisode { caption, place, .. }) = self.episodes.first() else { return };
+        let Some(Film { record, .. }) = self.films.first() else { return };
         let px = |units| self.layout.px(units);
         let top = self.layout.plots_top() + px(PLOTS_HEIGHT);
-        canvas.write(&caption.prompt, px(10.0), top + px(16.0), px(TEXT_SIZE), TEXT);
+        canvas.write(&record.header.prompt, px(10.0), top + px(16.0), px(TEXT_SIZE), TEXT);
         // A single column is too narrow for it.
-        let red =
-            if self.episodes.len() > 1 { " · red: beyond the stable strain of the material" } else { "" };
-        let text = format!("{place} · {when}{red}");
+        let red = if self.films.len() > 1 { " · red: beyond the stable strain of the material" } else { "" };
+        let text = format!("{} · {when}{red}", place(record));
         canvas.write(&text, px(10.0), top + px(34.0), px(12.0), FAINT);
     }
 }

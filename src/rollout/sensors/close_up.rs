@@ -13,9 +13,8 @@ use softvt_physics::{
     world::{ContactPatch, WorldSnapshot},
 };
 use softvt_scene::{Body, Camera, CameraMount, ROBOT_SEGMENTATION_ID};
-use softvt_sensing::camera::{FrameView, RenderedImage};
+use softvt_sensing::camera::{Channels, FrameView, RenderedImage};
 
-/// How a close-up is rendered.
 #[derive(Clone, Copy, Debug)]
 pub struct CloseUp<'a> {
     /// Width and height, pixels.
@@ -41,9 +40,6 @@ impl Sensors {
     /// Renders a close-up of the object `index` as people see best how it deforms: the skin of soft bodies coloured by
     /// their strain over the stable strain of their material, the robot translucent, the contact patches of the pads
     /// outlined in black, and the settled shape, from which D is measured, in grey.
-    ///
-    /// # Errors
-    /// As [`render`](Self::render).
     pub fn close_up(
         &mut self,
         frame: &WorldSnapshot,
@@ -84,9 +80,6 @@ impl Sensors {
     }
 
     /// Renders the object `index` from nearby as it looks, without the robot.
-    ///
-    /// # Errors
-    /// As [`render`](Self::render).
     pub fn portrait(
         &mut self,
         frame: &WorldSnapshot,
@@ -132,7 +125,7 @@ impl Sensors {
     ) -> Result<RenderedImage, SensingError> {
         let render_scene = self.built_scene()?;
         let view = FrameView { hidden_id, hand_w: Some(Pose::identity()), ..self.view(frame) };
-        Ok(self.close_up_renderer.render_segmentation(&render_scene, &view, camera)?)
+        Ok(self.close_up_renderer.render_channels(&render_scene, &view, camera, Channels::Centres)?)
     }
 
     /// The state `frame` with the soft object `index` in its settled shape, moved rigidly to where the object is now.
@@ -319,13 +312,6 @@ mod tests {
         let full = Mask::new(6, |_| true);
         let edge = full.outline(|a, b| (a % 6 < 2) != (b % 6 < 2));
         assert_eq!(edge.0, mask(&[".##..."; 6]).0);
-    }
-
-    #[test]
-    fn an_overlay_mixes_its_colour_by_opacity_where_the_mask_is_set() {
-        let mut rgb = [0, 100, 200, 10, 20, 30];
-        Overlay { colour: [200, 100, 0], opacity: 0.25 }.draw(&mut rgb, &mask(&["#."]));
-        assert_eq!(rgb, [50, 100, 150, 10, 20, 30]);
     }
 
     #[test]

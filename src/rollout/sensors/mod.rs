@@ -5,7 +5,7 @@
 mod close_up;
 mod error;
 
-use std::sync::Arc;
+use std::{collections::BTreeMap, sync::Arc};
 
 pub use close_up::{CloseUp, strain_colour};
 pub use error::SensingError;
@@ -27,8 +27,8 @@ use softvt_robot::{RobotSpec, Side, pads, panda};
 use softvt_scene::{Camera, CameraMount, ROBOT_SEGMENTATION_ID, Scene};
 use softvt_sensing::{
     camera::{
-        CameraError, FrameView, RenderObject, RenderScene, RenderedImage, Renderer, RestState, check_cameras,
-        check_light,
+        CameraError, Channels, FrameView, RenderObject, RenderScene, RenderedImage, Renderer, RestState,
+        check_cameras, check_light,
     },
     tactile::{
         GelScratch, PadWrench, PlacedSkin, SkinMesh, SubstrateCompliance, TactileContact, TactileReading,
@@ -120,7 +120,6 @@ impl Sensors {
         Self { seed, ..self }
     }
 
-    /// Seed of the errors of the sensors.
     pub(super) fn seed(&self) -> SensorSeed {
         self.seed
     }
@@ -130,8 +129,6 @@ impl Sensors {
         sim.world.snapshot(&sim.robot.pads)
     }
 
-    /// The scene's camera of a name.
-    ///
     /// # Errors
     /// The scene has no camera of that name.
     pub fn camera(&self, name: &str) -> Result<&Camera, SensingError> {
@@ -141,7 +138,6 @@ impl Sensors {
         })
     }
 
-    /// The scene's cameras.
     pub fn cameras(&self) -> &[Camera] {
         &self.scene.cameras
     }
@@ -153,36 +149,30 @@ impl Sensors {
     /// # Errors
     /// A parameter of the camera or the light is out of range, or an object cannot be rendered.
     pub fn render(&mut self, frame: &WorldSnapshot, camera: &Camera) -> Result<RenderedImage, SensingError> {
-        self.render_by(Renderer::render, frame, camera)
+        self.render_channels(frame, camera, Channels::All)
     }
 
     /// As [`render`](Self::render), faster, but with the same colours alone: depth and segmentation are empty.
-    ///
-    /// # Errors
-    /// As [`render`](Self::render).
     pub fn render_rgb(
         &mut self,
         frame: &WorldSnapshot,
         camera: &Camera,
     ) -> Result<RenderedImage, SensingError> {
-        self.render_by(Renderer::render_rgb, frame, camera)
+        self.render_channels(frame, camera, Channels::Colours)
     }
 
-    fn render_by(
+    fn render_channels(
         &mut self,
-        render: fn(&mut Renderer, &RenderScene, &FrameView, &Camera) -> Result<RenderedImage, CameraError>,
         frame: &WorldSnapshot,
         camera: &Camera,
+        channels: Channels,
     ) -> Result<RenderedImage, SensingError> {
         let (render_scene, view) = (self.built_scene()?, self.view(frame));
-        let image = render(&mut self.renderer, &render_scene, &view, camera);
+        let image = self.renderer.render_channels(&render_scene, &view, camera, channels);
         image.map_err(|error| SensingError::from(error).set_by(camera))
     }
 
     /// As [`render`](Self::render), for a camera that is used once: nothing is kept for its next image.
-    ///
-    /// # Errors
-    /// As [`render`](Self::render).
     pub fn render_once(
         &mut self,
         frame: &WorldSnapshot,
@@ -232,9 +222,6 @@ impl Sensors {
     }
 
     /// Renders the image of a camera in an initial state, in which it must not be inside an object.
-    ///
-    /// # Errors
-    /// As [`Sensors::render`]; also if the camera is inside an object.
     pub fn render_unobstructed(
         &mut self,
         frame: &WorldSnapshot,
@@ -252,10 +239,11 @@ impl Sensors {
 
     /// Computes the requested streams once in the initial state of an episode, so that errors appear before
     /// its first control step.
-    ///
-    /// # Errors
-    /// As [`Sensors::render_unobstructed`] and [`Sensors::tactile_readings`].
-    pub fn validate(&mut self, frame: &WorldSnapshot, streams: &SensorStreams) -> Result<(), SensingError> {
+    pub fn compute_once(
+        &mut self,
+        frame: &WorldSnapshot,
+        streams: &SensorStreams,
+    ) -> Result<(), SensingError> {
         for name in &streams.cameras {
             let camera = self.camera(name)?.clone().with_edge(TRIAL_EDGE);
             self.render_unobstructed(frame, &camera)?;
@@ -305,9 +293,6 @@ impl Sensors {
     }
 
     /// Readings of both tactile sensors in the form of observations.
-    ///
-    /// # Errors
-    /// As [`Sensors::tactile_readings`].
     pub fn tactile_frames(&mut self, frame: &WorldSnapshot) -> Result<[TactileFrame; 2], SensingError> {
         let both = self.tactile_readings(frame)?;
         let untouched = self.assets.sensor(&self.spec)?.untouched_image.clone();
@@ -327,9 +312,6 @@ impl Sensors {
     }
 
     /// Reading of one tactile sensor in a state.
-    ///
-    /// # Errors
-    /// As [`Sensors::tactile_readings`].
     pub fn tactile_reading(
         &mut self,
         frame: &WorldSnapshot,
@@ -461,31 +443,23 @@ fn camera_w(camera: &Camera, view: &FrameView) -> Pose {
 pub fn check_sensors(scene: &Scene, spec: &TactileSpec, assets: &AssetCache) -> Result<(), SensingError> {
     check_cameras(&scene.cameras)
         .map_err(|(index, error)| SensingError::from(error).set_by(&scene.cameras[index]))?;
-    check_names(&scene.cameras)?;
+    // The files of two images of one name would overwrite each other.
+    let mut taken: BTreeMap<String, String> = BTreeMap::new();
+    for finger in TACTILE_IMAGES {
+        taken.extend(TACTILE_IMAGE_SUFFIXES.map(|kind| (format!("{finger}{kind}"), "a finger".to_owned())));
+    }
+    for camera in &scene.cameras {
+        let names = CAMERA_IMAGE_SUFFIXES.map(|kind| format!("{}{kind}", camera.name));
+        if let Some((image, owner)) = names.iter().find_map(|name| taken.get_key_value(name)) {
+            let (camera_name, image, owner) = (camera.name.clone(), image.clone(), owner.clone());
+            return Err(SensingError::Name { camera: camera_name, image, owner }.set_by(camera));
+        }
+        taken.extend(names.map(|name| (name, format!("camera {}", camera.name))));
+    }
     check_light(&scene.lighting)?;
     // Other optics models read no files.
     if let OpticsModel::Taxim { .. } = spec.optics {
         assets.sensor(spec)?;
-    }
-    Ok(())
-}
-
-/// Checks that no two images of cameras and fingers have the same name; their files would overwrite each other.
-fn check_names(cameras: &[Camera]) -> Result<(), SensingError> {
-    let image_names = |owner: &str, kinds: [&str; 3]| kinds.map(|kind| format!("{owner}{kind}"));
-    let mut taken: Vec<(String, String)> = Vec::new();
-    for finger in TACTILE_IMAGES {
-        taken.extend(image_names(finger, TACTILE_IMAGE_SUFFIXES).map(|name| (name, "a finger".to_owned())));
-    }
-    for camera in cameras {
-        for name in image_names(&camera.name, CAMERA_IMAGE_SUFFIXES) {
-            if let Some((_, owner)) = taken.iter().find(|(known, _)| *known == name) {
-                let (camera_name, owner) = (camera.name.clone(), owner.clone());
-                return Err(SensingError::Name { camera: camera_name, image: name, owner }.set_by(camera));
-            }
-        }
-        let owner = format!("camera {}", camera.name);
-        taken.extend(image_names(&camera.name, CAMERA_IMAGE_SUFFIXES).map(|name| (name, owner.clone())));
     }
     Ok(())
 }
@@ -505,7 +479,6 @@ fn substrate_of(object: &ObjectInstance) -> Option<SubstrateCompliance> {
     Some(SubstrateCompliance { modulus, resolved: 2.0 * model.mesh.edge })
 }
 
-/// Configuration of a body.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum BodyConfiguration<'a> {
     /// Node positions of a soft body, m, world.
@@ -517,7 +490,6 @@ pub enum BodyConfiguration<'a> {
 /// States of an episode, from which images and tactile readings can be computed later.
 #[derive(Debug)]
 pub struct StateRecording {
-    /// Sensors of the simulation.
     pub sensors: Sensors,
     /// The settled state and the state after each control step.
     pub frames: Vec<WorldSnapshot>,
@@ -554,7 +526,6 @@ impl StateDeformation {
         self.tau_pct.filter(|tau| *tau > 0.0).map(|tau| self.d_pct / tau)
     }
 
-    /// True if D is above τ.
     pub fn is_over(&self) -> bool {
         self.tau_pct.is_some_and(|tau| self.d_pct > tau)
     }
@@ -571,31 +542,5 @@ mod tests {
         assert_eq!(shown, Some(StateDeformation { d_pct: 0.6, tau_pct: Some(0.5) }));
         assert!(shown.is_some_and(|of| of.is_over()));
         assert_eq!(StateDeformation::worst([(None, None)]), None, "a rigid target");
-    }
-
-    fn named(names: &[&str]) -> Vec<Camera> {
-        let camera = |name: &&str| Camera { name: (*name).to_owned(), ..Camera::wrist() };
-        names.iter().map(camera).collect()
-    }
-
-    #[test]
-    fn names_of_images_are_unique() {
-        assert!(check_names(&named(&["third_person", "wrist", "wrist_2", "depth"])).is_ok());
-        for (names, words) in [
-            (
-                ["wrist", "wrist_depth"],
-                "camera wrist_depth: name: \"wrist_depth\" is an image of camera wrist",
-            ),
-            (
-                ["wrist_depth", "wrist"],
-                "camera wrist: name: \"wrist_depth\" is an image of camera wrist_depth",
-            ),
-            (["wrist", "tactile_left"], "\"tactile_left\" is an image of a finger"),
-            (["wrist", "tactile_right_arrows"], "\"tactile_right_arrows\" is an image of a finger"),
-            (["wrist", "wrist"], "camera wrist: name: \"wrist\" is an image of camera wrist"),
-        ] {
-            let error = check_names(&named(&names)).expect_err(words);
-            assert!(error.to_string().contains(words), "{error}");
-        }
     }
 }

@@ -15,11 +15,10 @@ use crate::{
     error::RunError,
     policy::{ControllerFactory, PolicyConfig},
     recording::{HoldingLog, RecordingOptions, RecordingSummary, SuiteRecording, record_all},
-    suite_run::SuiteRun,
+    suite_run::{ImportedDemos, SuiteRun},
     suite_selection::select_suites,
 };
-use softvt_common::episode_id::EpisodeIndex;
-use softvt_common::{parallel, text::counted};
+use softvt_common::{episode_id::EpisodeIndex, parallel, text::counted};
 use softvt_dataset::import::{self, ForeignDemo, ForeignFile, InitialCondition};
 use softvt_policy::{ToolCommand, builtin::RecordedPolicy};
 use softvt_rollout::{ChunkedPolicy, target_asset};
@@ -27,7 +26,6 @@ use softvt_runs::{manifest::ImportedFile, record::DemonstrationOrigin};
 use softvt_scene::{Body, InitialStateOverride};
 use task_matching::{MatchedDemo, match_demos};
 
-/// Options of an import of demonstrations.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct ImportOptions {
     /// Maximum number of demonstrations per task, in order; by default all.
@@ -70,7 +68,7 @@ pub fn import(
     recording.describe(&mut request);
     record_all(recording, &request, || {
         for ImportedFile { file, format, demos, commands, .. } in &sources {
-            config.notice(format!("{file}: {format}, {}: {commands}", counted(*demos, "demonstration")));
+            config.notice(format_args!("{file}: {format}, {}: {commands}", counted(*demos, "demonstration")));
         }
         let mut recordings = Vec::new();
         for (index, suite) in suites.iter().enumerate() {
@@ -88,10 +86,7 @@ pub fn import(
                 suite,
                 EpisodeList::listed(jobs),
                 None,
-                |run, log| {
-                    let run = replay_demos(run, log, &demos, options.ignore_recorded_poses)?;
-                    Ok(SuiteRun { imported: sources.clone(), ..run })
-                },
+                |run, log| replay_demos(run, log, &demos, options.ignore_recorded_poses, sources.clone()),
             )?);
         }
         Ok(recordings)
@@ -99,14 +94,11 @@ pub fn import(
 }
 
 /// Describes the files for `recording.json` and the dataset card.
-///
-/// # Errors
-/// Two files have the same content.
 fn describe_files(files: &[ForeignFile]) -> Result<Vec<ImportedFile>, RunError> {
     let mut seen: BTreeMap<&str, &ForeignFile> = BTreeMap::new();
     for file in files {
         if let Some(twin) = seen.insert(&file.sha256, file) {
-            return Err(RunError::input(format!(
+            return Err(RunError::input(format_args!(
                 "{} and {} are byte-identical; name one of them",
                 twin.path.display(),
                 file.path.display()
@@ -134,6 +126,7 @@ fn replay_demos<'a>(
     grip_log: &HoldingLog,
     demos: &[&MatchedDemo],
     ignore_recorded_poses: bool,
+    files: Vec<ImportedFile>,
 ) -> Result<SuiteRun<'a>, RunError> {
     let mut origins = BTreeMap::new();
     let mut commands: BTreeMap<EpisodeIndex, Vec<ToolCommand>> = BTreeMap::new();
@@ -160,13 +153,13 @@ fn replay_demos<'a>(
         Ok(Box::new(ChunkedPolicy::new(Box::new(RecordedPolicy::new(commands, None)), brief, 1)))
     });
     if foreign > 0 {
-        run.config.notice(format!(
+        run.config.notice(format_args!(
             "{}: in {placed} of {foreign} demonstrations objects start where the file has them, in the others where the \
              layout puts them",
             run.suite.name
         ));
     }
-    Ok(SuiteRun { origins, controllers, ..run })
+    Ok(SuiteRun { import: ImportedDemos { origins, files }, controllers, ..run })
 }
 
 /// The initial state of a demonstration in the suite, and the demonstration adapted to the suite.

@@ -1,12 +1,14 @@
 //! Matching of foreign demonstrations to tasks: by `--task`, by their instructions, or by their task indices.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::{
+    collections::{BTreeMap, BTreeSet},
+    fmt::Display,
+};
 
 use crate::{config::RunConfig, error::RunError, suite_selection::select_tasks};
 use softvt_benchmark::{Suite, Task};
 use softvt_dataset::import::{ForeignDemo, ForeignFile, ForeignFormat, ForeignTask, InitialCondition};
 
-/// A task of one of several suites.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct SuiteTask<'a> {
     /// Position of the suite in the list of suites.
@@ -32,15 +34,11 @@ pub(super) struct MatchedDemo<'a> {
     pub file: &'a ForeignFile,
     pub demo: &'a ForeignDemo,
     pub task: SuiteTask<'a>,
-    /// Number of the attempt.
     pub attempt: u32,
 }
 
 /// Finds the tasks of all demonstrations, at most `max` of each task, and numbers the attempts. Demonstrations of
 /// softvt keep their attempt numbers; the others get the free ones in order.
-///
-/// # Errors
-/// A demonstration matches no task or several, or has another seed; or two are the same attempt.
 pub(super) fn match_demos<'a>(
     config: &RunConfig,
     suites: &'a [Suite],
@@ -57,14 +55,11 @@ pub(super) fn match_demos<'a>(
             Some(forced) if task_of(config, suites, file, demo)?.key() == forced.key() => forced,
             Some(_) => {
                 let id = demo.task.id.map_or(String::new(), |id| format!(" {id}"));
-                return Err(refuse(
-                    file,
-                    demo,
-                    format!(
-                        "it was recorded by softvt and is of task{id}, not of the selected {}; select none",
-                        config.tasks.join(",")
-                    ),
-                ));
+                let selected = config.tasks.join(",");
+                let what = format!(
+                    "it was recorded by softvt and is of task{id}, not of the selected {selected}; select none"
+                );
+                return Err(refuse(file, demo, what));
             }
             None => task_of(config, suites, file, demo)?,
         };
@@ -83,15 +78,11 @@ pub(super) fn match_demos<'a>(
     let is_foreign = |matched: &MatchedDemo| {
         matches!(matched.demo.initial_condition, InitialCondition::OtherSimulator { .. })
     };
-    for MatchedDemo { file, demo, task, attempt } in found.iter().filter(|matched| !is_foreign(matched)) {
-        if !taken.insert((task.key(), *attempt)) {
-            return Err(refuse(
-                file,
-                demo,
-                format!(
-                    "another demonstration is of the same task and attempt {attempt}; import them into separate folders"
-                ),
-            ));
+    for &MatchedDemo { file, demo, task, attempt } in found.iter().filter(|matched| !is_foreign(matched)) {
+        if !taken.insert((task.key(), attempt)) {
+            let what =
+                "another demonstration is of the same task and attempt; import them into separate folders";
+            return Err(refuse(file, demo, what));
         }
     }
     for matched in found.iter_mut().filter(|matched| is_foreign(matched)) {
@@ -102,14 +93,11 @@ pub(super) fn match_demos<'a>(
     Ok(found)
 }
 
-fn refuse(file: &ForeignFile, demo: &ForeignDemo, message: String) -> RunError {
-    RunError::input(format!("{}: {}: {message}", file.path.display(), demo.name))
+fn refuse(file: &ForeignFile, demo: &ForeignDemo, message: impl Display) -> RunError {
+    RunError::input(format_args!("{}: {}: {message}", file.path.display(), demo.name))
 }
 
 /// The task that `--task` selects, if it is given.
-///
-/// # Errors
-/// It selects none or several.
 fn forced_task<'a>(config: &RunConfig, suites: &'a [Suite]) -> Result<Option<SuiteTask<'a>>, RunError> {
     if config.tasks.is_empty() {
         return Ok(None);
@@ -146,13 +134,10 @@ fn own_attempt(config: &RunConfig, file: &ForeignFile, demo: &ForeignDemo) -> Re
     match &demo.initial_condition {
         InitialCondition::OtherSimulator { .. } => Ok(None),
         InitialCondition::SoftvtEpisode { seed, attempt, .. } if *seed == own => Ok(Some(*attempt)),
-        InitialCondition::SoftvtEpisode { seed, .. } => Err(refuse(
-            file,
-            demo,
-            format!(
-                "it was recorded with the seed {seed}, and this import uses the seed {own}; import it with the seed {seed}"
-            ),
-        )),
+        InitialCondition::SoftvtEpisode { seed, .. } => {
+            let what = format!("it was recorded with the seed {seed}; import it with that seed, not {own}");
+            Err(refuse(file, demo, what))
+        }
     }
 }
 
@@ -194,14 +179,9 @@ fn task_of<'a>(
             _ => {
                 let name = |found: &SuiteTask| format!("{} task {}", suites[found.suite].name, found.task.id);
                 let tasks: Vec<String> = matching.iter().map(name).collect();
-                return Err(refuse(
-                    file,
-                    demo,
-                    format!(
-                        "its instruction, {prompt:?}, is that of {}; select one of them",
-                        tasks.join(", ")
-                    ),
-                ));
+                let what =
+                    format!("its instruction, {prompt:?}, is that of {}; select one", tasks.join(", "));
+                return Err(refuse(file, demo, what));
             }
         }
     }
@@ -215,20 +195,10 @@ fn task_of<'a>(
 
 fn no_task(config: &RunConfig, suites: &[Suite], file: &ForeignFile, demo: &ForeignDemo) -> RunError {
     let ForeignTask { suite, id, prompts } = &demo.task;
-    let task = match (prompts.first(), id) {
-        (Some(prompt), _) => Some(format!("{prompt:?}")),
-        (None, Some(id)) => Some(format!("task {id}")),
-        (None, None) => None,
-    };
-    let script = config.file.display();
-    let problem = match (task, suite) {
-        (Some(task), Some(suite)) => {
-            format!("it is of {task} of the suite {suite}, and {script} has no such task")
-        }
-        (Some(task), None) => format!("it is of {task}, and {script} has no such task"),
-        (None, Some(suite)) => format!("it is of the suite {suite}, but does not name its task"),
-        (None, None) => "it does not name its task, by an instruction or an index".to_owned(),
-    };
+    let named = prompts.first().map(|prompt| format!("{prompt:?}"));
+    let task = named.or_else(|| id.map(|id| format!("task {id}"))).unwrap_or("an unnamed task".to_owned());
+    let of_suite = suite.as_ref().map_or(String::new(), |suite| format!(" of the suite {suite}"));
+    let problem = format!("it is of {task}{of_suite}, and {} has no such task", config.file.display());
     if file.format == ForeignFormat::Softvt {
         let fix = "softvt imports its own recordings into their own task, whatever task is selected; name the file of their suite";
         return refuse(file, demo, format!("{problem}; {fix}"));

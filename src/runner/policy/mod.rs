@@ -32,7 +32,6 @@ const DEFAULT_TIMEOUT: Duration = Duration::from_secs(60);
 /// Name of the clients of `softvt serve` in results, unless stated.
 const CLIENT: &str = "client";
 
-/// Makes the controller of an episode.
 pub type ControllerFactory =
     Box<dyn Fn(EpisodeSetup, EpisodeBrief) -> Result<Box<dyn Controller>, RunError> + Send + Sync>;
 
@@ -50,10 +49,8 @@ enum PolicyKind {
     External,
 }
 
-/// Makes a policy for an episode.
 type StartPolicy = dyn Fn(&EpisodeBrief) -> Box<dyn Policy> + Send + Sync;
 
-/// A policy in Rust.
 #[derive(Clone)]
 struct RustPolicy(Arc<StartPolicy>);
 
@@ -66,17 +63,13 @@ impl fmt::Debug for RustPolicy {
 /// The sensors that the file of a policy declares.
 #[derive(Clone, Debug)]
 pub struct DeclaredStreams {
-    /// Source location of the declaration.
     pub place: String,
-    /// The declared sensors.
     pub streams: SensorStreams,
 }
 
-/// A loaded policy.
 #[derive(Clone, Debug)]
 pub struct PolicyConfig {
     kind: PolicyKind,
-    /// The name that results show.
     pub name: String,
     /// Actions executed from each chunk, for policies that predict chunks.
     pub replan: Option<usize>,
@@ -124,13 +117,10 @@ impl PolicyConfig {
         }
     }
 
-    /// A built-in policy.
     pub fn builtin(policy: BuiltinPolicy) -> Self {
         Self::new(PolicyKind::Builtin(policy), policy.name().to_owned())
     }
 
-    /// Loads a policy.
-    ///
     /// # Errors
     /// A file that is not valid, a folder without a run, or an option that has no effect on this policy.
     pub fn load(args: &PolicyOptions) -> Result<Self, RunError> {
@@ -183,28 +173,21 @@ impl PolicyConfig {
         Ok(policy)
     }
 
-    /// The built-in policy of a name.
-    ///
-    /// # Errors
-    /// No policy has the name.
     pub fn named(name: &str) -> Result<Self, RunError> {
         BuiltinPolicy::named(name).map(Self::builtin).ok_or_else(|| {
             let hint = suggestion(name, BuiltinPolicy::all().map(BuiltinPolicy::name));
-            RunError::input(format!("policy: expected {}, got {name:?}{hint}", BuiltinPolicy::names()))
+            RunError::input(format_args!("policy: expected {}, got {name:?}{hint}", BuiltinPolicy::names()))
         })
     }
 
     /// A policy in Rust, under this name in the results. `start` makes it for each episode; of each chunk of actions,
     /// all are executed unless `replan` is set.
-    ///
-    /// # Errors
-    /// A built-in policy has the name.
     pub fn of(
         name: &str,
         start: impl Fn(&EpisodeBrief) -> Box<dyn Policy> + Send + Sync + 'static,
     ) -> Result<Self, RunError> {
         if BuiltinPolicy::named(name).is_some() {
-            return Err(RunError::input(format!(
+            return Err(RunError::input(format_args!(
                 "policy: {name:?} is a built-in policy; give yours another name"
             )));
         }
@@ -227,7 +210,7 @@ impl PolicyConfig {
         Self::new(PolicyKind::External, name.to_owned())
     }
 
-    /// How a scripted expert controls the gripper. `None` for other policies.
+    /// Grip control of a scripted expert. `None` for other policies.
     pub fn expert(&self) -> Option<ExpertGrip> {
         match self.kind {
             PolicyKind::Builtin(policy) => policy.grip_mode(),
@@ -277,9 +260,6 @@ impl PolicyConfig {
     }
 
     /// Starts the policy for an episode, if it answers observations with chunks of actions.
-    ///
-    /// # Errors
-    /// The script of a policy in Lua fails.
     pub(crate) fn start(
         &self,
         connections: Option<&Arc<PolicyConnections>>,
@@ -337,8 +317,6 @@ impl PolicyConfig {
     }
 }
 
-/// Starts the expert of a task.
-///
 /// # Errors
 /// The task has none, or its script fails.
 pub fn expert_controller(opened: EpisodeSetup, mode: ExpertGrip) -> Result<ExpertController, RunError> {

@@ -16,11 +16,9 @@ const DEFAULT_PROFILE: &str = "visuo_tactile";
 /// A policy that is not loaded yet, and how it is connected. By default, the expert of the task.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct PolicyOptions {
-    /// The policy.
     pub policy: PolicySource,
     /// Observations and action encoding of a policy server: a name or a Lua file.
     pub profile: Option<String>,
-    /// Protocol of a policy server.
     pub protocol: Option<ServerProtocol>,
     /// Grip code in place of that of the profile or the Lua policy.
     pub gripper: Option<GripCode>,
@@ -28,12 +26,10 @@ pub struct PolicyOptions {
     pub replan: Option<u16>,
     /// Timeout for connecting and for each reply.
     pub timeout: Option<Duration>,
-    /// Name in results.
     pub name: Option<String>,
 }
 
 impl PolicyOptions {
-    /// A policy without options.
     pub fn new(policy: PolicySource) -> Self {
         Self { policy, ..Self::default() }
     }
@@ -53,10 +49,6 @@ impl PolicyOptions {
         differing_fields!(self, others, Self { policy, profile, protocol, gripper, replan, timeout, name })
     }
 
-    /// The options that the policy reads.
-    ///
-    /// # Errors
-    /// An option that the policy does not read.
     pub(super) fn checked(&self) -> Result<Self, RunError> {
         let read = self.read();
         match self.differing(&read).first() {
@@ -66,9 +58,6 @@ impl PolicyOptions {
     }
 
     /// These options for each of several policies, as far as it reads them.
-    ///
-    /// # Errors
-    /// An option that no policy reads.
     pub fn shared_by(&self, policies: &[PolicySource]) -> Result<Vec<Self>, RunError> {
         let given = policies.iter().map(|policy| Self { policy: policy.clone(), ..self.clone() });
         let (mut read, mut unread): (Vec<Self>, Option<Vec<&str>>) = (Vec::new(), None);
@@ -87,15 +76,11 @@ impl PolicyOptions {
         }
     }
 
-    /// The name of the profile.
     pub(super) fn profile_name(&self) -> &str {
         self.profile.as_deref().unwrap_or(DEFAULT_PROFILE)
     }
 
     /// Loads the profile, with the grip code of the options.
-    ///
-    /// # Errors
-    /// A file that is not a valid profile, or a grip code that the profile has no values for.
     pub(super) fn load_profile(&self) -> Result<Profile, RunError> {
         let name = self.profile_name();
         let mut profile = match Profile::named(name) {

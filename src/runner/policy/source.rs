@@ -10,12 +10,10 @@ use softvt_common::text;
 use softvt_dataset::layout::is_dataset;
 use softvt_script::{BlindGrip, ExpertGrip};
 
-/// Sources of policies.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum PolicySource {
     /// A policy that needs no file.
     Builtin(BuiltinPolicy),
-    /// A policy in Lua.
     Lua(PathBuf),
     /// The address of a policy server.
     Server(String),
@@ -41,7 +39,6 @@ impl From<Teacher> for PolicySource {
 /// Policies that need no file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum BuiltinPolicy {
-    /// The expert of the task.
     Expert,
     /// The expert with a hand that closes fully.
     ExpertBinary,
@@ -51,7 +48,6 @@ pub enum BuiltinPolicy {
     Controlled(BlindGrip),
     /// A robot that holds still.
     Noop,
-    /// Random actions.
     Random,
 }
 
@@ -93,7 +89,6 @@ impl BuiltinPolicy {
         Self::all().map(Self::name).collect::<Vec<_>>().join(", ")
     }
 
-    /// The policy of a name.
     pub fn named(name: &str) -> Option<Self> {
         Self::all().find(|policy| policy.name() == name)
     }
@@ -122,7 +117,7 @@ impl BuiltinPolicy {
         }
     }
 
-    /// How the gripper is controlled, for scripted experts, which have access to ground-truth state.
+    /// Grip control of scripted experts, which have access to ground-truth state.
     pub(super) fn grip_mode(self) -> Option<ExpertGrip> {
         Some(match self {
             Self::Expert => ExpertGrip::Commanded,

@@ -32,7 +32,6 @@ const MAX_LAG: i32 = 10;
 /// Lag within which policies differ, control steps.
 const AGREEING_LAG: i32 = 1;
 
-/// A unit of channels.
 struct Unit {
     name: &'static str,
     /// Offsets and residuals that are a matter of precision.
@@ -48,7 +47,6 @@ const CLOSURE: Unit = Unit { name: "closure", offset: 0.25, residual: 0.25 };
 /// unit of the channel.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ChannelFit {
-    /// Channel of the answers.
     pub channel: String,
     /// Quantity of the demonstrations that it follows best.
     pub source: String,
@@ -56,7 +54,6 @@ pub struct ChannelFit {
     pub unit: &'static str,
     /// Scale of the answer; null if the demonstrations do not tell it.
     pub scale: Option<f64>,
-    /// Offset of the answer.
     pub offset: f64,
     /// Control steps of the demonstrations per command; −1 if the answers are reversed in time.
     pub rate: f64,
@@ -78,7 +75,6 @@ struct Channel {
     own: Vec<Quantity>,
 }
 
-/// A meaning of a channel.
 #[derive(Clone, Copy, Debug)]
 struct Reading {
     quantity: Quantity,
@@ -87,7 +83,6 @@ struct Reading {
     is_own: bool,
 }
 
-/// A reading with its affine map.
 #[derive(Clone, Copy, Debug)]
 struct Fit {
     reading: Reading,
@@ -97,7 +92,6 @@ struct Fit {
     residual: f64,
 }
 
-/// All demonstrations and the answers to them.
 struct Comparison<'a> {
     demos: Vec<DemoSeries<'a>>,
     has_joints: bool,
@@ -157,13 +151,11 @@ impl Comparison<'_> {
             is_own: channel.own.contains(&quantity),
         };
         let axes = |of: fn(usize) -> Quantity, form: Form| (0..3).map(move |i| (of(i), form));
-        let mut all = Vec::new();
-        if channel.unit.name == CLOSURE.name {
-            all.extend(channel.own.iter().map(|own| reading(*own, Form::Plain)));
-        } else {
-            let own = Reading { is_own: true, ..reading(self.displacement(channel.index), Form::Displaced) };
-            all.push(own);
-        }
+        let own = Reading { is_own: true, ..reading(self.displacement(channel.index), Form::Displaced) };
+        let mut all = match channel.unit.name == CLOSURE.name {
+            true => channel.own.iter().map(|own| reading(*own, Form::Plain)).collect(),
+            false => vec![own],
+        };
         let mut others: Vec<(Quantity, Form)> = Vec::new();
         if self.has_joints {
             others.extend((0..ARM_DOFS).map(|i| (Quantity::Joint(i), Form::Plain)));
@@ -247,26 +239,16 @@ impl Comparison<'_> {
         let scale = both / spread_x.powi(2);
         let residual = (spread_y.powi(2) - scale * both).max(0.0).sqrt();
         let scale_error = residual / (n.sqrt() * spread_x);
+        let is_plain = is_own && timing == Timing::NONE;
         if spread_x > LEAST_VARIATION && scale_error <= 0.5 * scale.abs().max(1.0) {
             let is_explained = residual < (1.0 - EXPLAINED).sqrt() * spread_y;
-            let offset = mean_y - scale * mean_x;
-            return (is_explained || is_own && timing == Timing::NONE).then_some(Fit {
-                reading,
-                scale: Some(scale),
-                scale_error,
-                offset,
-                residual,
-            });
+            let fit =
+                Fit { reading, scale: Some(scale), scale_error, offset: mean_y - scale * mean_x, residual };
+            return (is_explained || is_plain).then_some(fit);
         }
         let left: Vec<f64> = x.iter().zip(&y).map(|(x, y)| y - x).collect();
         let (offset, residual) = (mean_y - mean_x, spread(&left));
-        (is_own && timing == Timing::NONE).then_some(Fit {
-            reading,
-            scale: None,
-            scale_error: 0.0,
-            offset,
-            residual,
-        })
+        is_plain.then_some(Fit { reading, scale: None, scale_error: 0.0, offset, residual })
     }
 
     /// Root mean square of the motion of the demonstrations in the channels of a unit.
@@ -324,7 +306,6 @@ impl Comparison<'_> {
     }
 }
 
-/// Standard deviation of numbers.
 fn spread(values: &[f64]) -> f64 {
     let center = mean(values).unwrap_or(0.0);
     mean(&values.iter().map(|x| (x - center).powi(2)).collect::<Vec<_>>()).unwrap_or(0.0).sqrt()

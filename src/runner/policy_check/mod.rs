@@ -27,7 +27,7 @@ use crate::{
     error::RunError,
     observer::Observer,
     policy::{ControllerFactory, PolicyConfig},
-    replay::{DemoRef, check_complete, demos_of, simulate_demo_with},
+    replay::{DemoRef, demos_of, simulate_demo_with},
     suite_run::policy_failure,
 };
 use softvt_common::{
@@ -41,19 +41,12 @@ use softvt_policy::Action;
 
 const NOT_COMPARABLE: &str = "only policy servers and policies in Lua can be compared with demonstrations";
 
-/// Headings of the table.
-const HEADINGS: [&str; 9] =
-    ["answer", "follows", "scale", "offset", "rate", "lag", "residual", "motion", "deviates"];
-
 const LEGEND: &str = "\nanswer = scale · followed quantity + offset. Δ: from the observed pose. Rate: control steps per action. Lag: control\n\
                       steps by which the answers are late. Residual and motion of the demonstrations: root mean squares.\n";
 
-/// Agreement of a policy with demonstrations.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct PolicyCheck {
-    /// Number of demonstrations.
     pub demonstrations: usize,
-    /// Number of answers.
     pub answers: usize,
     /// Median and largest time of an answer, s.
     pub answer_median_s: Option<f64>,
@@ -75,10 +68,9 @@ pub fn check_policy(
     count: usize,
     observer: &Arc<dyn Observer>,
 ) -> Result<PolicyCheck, RunError> {
-    check_complete(dataset)?;
     let all = demos_of(dataset)?;
     if all.is_empty() {
-        return Err(RunError::input(format!("{} has no demonstration", dataset.display())));
+        return Err(RunError::input(format_args!("{} has no demonstration", dataset.display())));
     }
     let count = count.clamp(1, all.len());
     let chosen: Vec<&DemoRef> = (0..count).map(|k| &all[k * all.len() / count]).collect();
@@ -110,9 +102,6 @@ pub fn check_policy(
 }
 
 /// The actions of a demonstration, with the joint positions that they mean.
-///
-/// # Errors
-/// The file cannot be read.
 pub fn recorded_steps(demo: &DemoRef) -> Result<Vec<RecordedStep>, RunError> {
     let file = TaskFile::open(&demo.file)?;
     // Files of earlier versions have none.
@@ -122,7 +111,6 @@ pub fn recorded_steps(demo: &DemoRef) -> Result<Vec<RecordedStep>, RunError> {
 }
 
 impl PolicyCheck {
-    /// Compares the answers to demonstrations.
     pub fn of(demos: &[DemoSamples]) -> Self {
         let mut seconds: Vec<f64> = demos.iter().flat_map(|demo| &demo.answer_s).copied().collect();
         seconds.sort_by(f64::total_cmp);
@@ -155,12 +143,20 @@ impl PolicyCheck {
             seconds(self.answer_median_s),
             seconds(self.answer_max_s),
         );
-        let column = |(at, heading): (usize, &'static str)| {
-            let cell = move |row: &[String; HEADINGS.len()]| row[at].clone();
-            let is_number = (2..HEADINGS.len() - 1).contains(&at);
-            if is_number { Column::number(heading, cell) } else { Column::text(heading, cell) }
-        };
-        text += &Table::new(&self.rows(), HEADINGS.into_iter().enumerate().map(column)).text();
+        let columns = [
+            Column::text("answer", |fit: &ChannelFit| fit.channel.clone()),
+            Column::text("follows", |fit: &ChannelFit| fit.source.clone()),
+            Column::number("scale", |fit: &ChannelFit| {
+                fit.scale.map_or_else(|| "–".to_owned(), |scale| rounded(scale, 1e4))
+            }),
+            Column::number("offset", |fit: &ChannelFit| fit.in_unit(fit.offset)),
+            Column::number("rate", |fit: &ChannelFit| significant(fit.rate, 3)),
+            Column::number("lag", |fit: &ChannelFit| fit.lag.to_string()),
+            Column::number("residual", |fit: &ChannelFit| fit.in_unit(fit.residual)),
+            Column::number("motion", |fit: &ChannelFit| fit.in_unit(fit.motion)),
+            Column::text("deviates", |fit: &ChannelFit| fit.deviates.join(", ")),
+        ];
+        text += &Table::new(&self.channels, columns).text();
         text += LEGEND;
         if let Some(failure) = &self.failure {
             text += &format!("failed at {failure}\n");
@@ -170,29 +166,21 @@ impl PolicyCheck {
         }
         text
     }
+}
 
-    fn rows(&self) -> Vec<[String; HEADINGS.len()]> {
-        let row = |fit: &ChannelFit| {
-            let (factor, unit) = match fit.unit {
-                "m" => (1e3, " mm"),
-                "rad" => (180.0 / std::f64::consts::PI, "°"),
-                _ => (1.0, ""),
-            };
-            let number = |x: f64| significant(x, 3);
-            // Rounding leaves no digits that say nothing.
-            let in_unit = |x: f64| format!("{}{unit}", number((1e3 * factor * x).round() / 1e3 + 0.0));
-            [
-                fit.channel.clone(),
-                fit.source.clone(),
-                fit.scale.map_or_else(|| "–".to_owned(), |scale| number((1e4 * scale).round() / 1e4 + 0.0)),
-                in_unit(fit.offset),
-                number(fit.rate),
-                fit.lag.to_string(),
-                in_unit(fit.residual),
-                in_unit(fit.motion),
-                fit.deviates.join(", "),
-            ]
+impl ChannelFit {
+    /// A number of the channel with three digits, in mm or degrees.
+    fn in_unit(&self, x: f64) -> String {
+        let (factor, unit) = match self.unit {
+            "m" => (1e3, " mm"),
+            "rad" => (180.0 / std::f64::consts::PI, "°"),
+            _ => (1.0, ""),
         };
-        self.channels.iter().map(row).collect()
+        format!("{}{unit}", rounded(factor * x, 1e3))
     }
+}
+
+/// A number with three digits, of which none is below 1 / `parts`; 0 has no sign.
+fn rounded(x: f64, parts: f64) -> String {
+    significant((parts * x).round() / parts + 0.0, 3)
 }

@@ -10,7 +10,7 @@ use softvt_common::parallel::lock;
 use softvt_geometry::{Quat, Vec3};
 use softvt_policy::{
     Action, ActionChunk, CommandResolver, EpisodeBrief, Observation, Policy, PolicyError, SensorStreams,
-    ToolCommand, ToolMotion, decode,
+    ToolCommand, ToolMotion,
     profile::{ActionEncoding, GripCode, GripperValues},
 };
 use softvt_robot::{ik::ArmAngles, rotation};
@@ -19,16 +19,14 @@ use softvt_rollout::{Controller, Simulation};
 /// A control step of a demonstration, as it was recorded.
 #[derive(Clone, Copy, Debug)]
 pub struct RecordedStep {
-    /// The action.
     pub action: Action,
     /// Joint positions that the action means, rad, if they are known.
     pub joints: Option<ArmAngles>,
 }
 
-/// The answer to one control step of a demonstration.
+/// The answer in a control step of a demonstration.
 #[derive(Clone, Debug)]
 pub(super) struct StepSample {
-    /// Control step of the request.
     pub request: usize,
     /// Observed position of the tool in the base frame, m.
     pub tool: Vec3,
@@ -53,7 +51,6 @@ pub struct DemoSamples {
     /// Time of each answer, s.
     pub(super) answer_s: Vec<f64>,
     pub(super) grip_code: GripCode,
-    /// The error that ended the comparison.
     pub(super) failure: Option<String>,
 }
 
@@ -70,13 +67,10 @@ struct PendingCommand {
 pub struct AnswerComparison {
     policy: Box<dyn Policy>,
     brief: Option<EpisodeBrief>,
-    /// Commands of an answer that are executed.
     replan: usize,
-    /// Encoding of the numbers of the answers.
     encoding: Option<ActionEncoding>,
     recorded: VecDeque<RecordedStep>,
     pending: VecDeque<PendingCommand>,
-    /// Control step of the last request.
     request: usize,
     resolver: CommandResolver,
     samples: Arc<Mutex<DemoSamples>>,
@@ -126,9 +120,6 @@ impl AnswerComparison {
     }
 
     /// Compares the next control step. Returns its recorded action, `None` after the last one.
-    ///
-    /// # Errors
-    /// The policy fails.
     pub fn compare_next(&mut self, observation: &Observation) -> Result<Option<Action>, PolicyError> {
         let Some(recorded) = self.recorded.pop_front() else { return Ok(None) };
         let compared = self.compare(observation, recorded);
@@ -173,7 +164,7 @@ impl AnswerComparison {
 
     fn ask(&mut self, observation: &Observation) -> Result<(), PolicyError> {
         let asked = Instant::now();
-        let ActionChunk { commands, rows } = self.policy.act(observation)?;
+        let ActionChunk { commands, encoded } = self.policy.act(observation)?;
         let mut samples = lock(&self.samples);
         samples.answer_s.push(asked.elapsed().as_secs_f64());
         self.request = samples.steps.len();
@@ -181,10 +172,10 @@ impl AnswerComparison {
             commands.into_iter().map(|command| PendingCommand { command, closure: None }).collect();
         if let Some(encoding) = &self.encoding {
             let GripperValues { open, closed, code, .. } = encoding.gripper;
-            for (pending, row) in self.pending.iter_mut().zip(&rows) {
-                pending.command.motion = decode::unclamped_command(row, encoding)?.motion;
-                let closure = row.last().map(|value| (value - open) / (closed - open));
-                pending.closure = closure.filter(|_| code != GripCode::Force);
+            for (pending, action) in self.pending.iter_mut().zip(&encoded) {
+                pending.command.motion = action.unclamped_motion(encoding);
+                let closure = (action.grip - open) / (closed - open);
+                pending.closure = (code != GripCode::Force).then_some(closure);
             }
         }
         self.pending.truncate(self.replan);

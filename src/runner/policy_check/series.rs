@@ -51,7 +51,6 @@ impl Quantity {
 /// A form of the numbers of answers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Form {
-    /// As they are.
     Plain,
     /// Rotation vectors without jumps by a turn.
     Continuous,
@@ -76,7 +75,6 @@ impl Timing {
     pub(super) const NONE: Self = Self { rate: 1.0, lag: 0 };
 }
 
-/// A demonstration and the answers to it.
 pub(super) struct DemoSeries<'a> {
     pub steps: &'a [StepSample],
     /// Commands of the answer of each control step.
@@ -85,7 +83,6 @@ pub(super) struct DemoSeries<'a> {
     euler: Vec<Vec3>,
     quaternions: Vec<[f64; 4]>,
     orientations: Vec<Quat>,
-    /// Middle of the recorded closures.
     middle: f64,
 }
 
@@ -179,7 +176,6 @@ impl<'a> DemoSeries<'a> {
         }
     }
 
-    /// The answered motion from the observed pose.
     fn displaced(&self, s: &StepSample, channel: usize) -> f64 {
         let from = if s.is_step { s } else { &self.steps[s.request] };
         match (s.answered.joints, channel) {

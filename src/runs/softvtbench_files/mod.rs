@@ -13,9 +13,11 @@ use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
 use crate::record::{EpisodeHeader, EpisodeRecord};
-use softvt_common::episode_id::{EpisodeId, EpisodeIndex};
-use softvt_common::files::{self, FileError, replace};
-use softvt_common::text::csv_field;
+use softvt_common::{
+    episode_id::{EpisodeId, EpisodeIndex},
+    files::{self, FileError, replace},
+    text::csv_field,
+};
 use softvt_evaluation::{
     deformation::{ReferenceShape, V1_METRIC_ID},
     statistics::{Rate, quantile},
@@ -23,7 +25,6 @@ use softvt_evaluation::{
 };
 use softvt_geometry::Vec3;
 
-/// Folder within a run folder.
 pub const FOLDER: &str = "softvtbench";
 /// One row per episode.
 const EPISODES_CSV: &str = "episodes.csv";
@@ -39,13 +40,10 @@ pub struct DebugFrame {
     pub frame: u32,
     /// Episode index in the task.
     pub exp_idx: u32,
-    /// Name of the suite.
     pub task_suite: String,
-    /// Index of the task in the suite.
     pub task_id: usize,
     /// True once the goal has held for the required time.
     pub success_now: bool,
-    /// Deformation of the target.
     #[serde(flatten)]
     pub shape: DebugShape,
 }
@@ -53,13 +51,10 @@ pub struct DebugFrame {
 /// Deformation of the target, with SoftVTBench's field names; % of the bounding-box diagonal, lengths in m.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct DebugShape {
-    /// True if D was measured.
     pub fem_deformation_known: bool,
     /// [`V1_METRIC_ID`]; null when not known.
     pub fem_deformation_metric_id: Option<String>,
-    /// Asset of the target.
     pub fem_deformation_asset: String,
-    /// Number of nodes of the target.
     pub fem_deformation_nodes: Option<usize>,
     /// Largest D over the physics steps of the control step, so that the peak of the frames is the peak of the rollout.
     pub fem_deformation_rms: Option<f64>,
@@ -123,9 +118,6 @@ pub fn debug_log_path(dir: &Path, index: EpisodeIndex) -> PathBuf {
 }
 
 /// Writes an episode's `policy_action_debug.jsonl` to `path`.
-///
-/// # Errors
-/// The file cannot be written.
 pub fn write_debug_log(path: &Path, header: &EpisodeHeader, frames: &[DebugFrame]) -> Result<(), FileError> {
     // The row of an episode that ended before its first control step: the scorer ignores episodes without rows.
     let unknown = || DebugShape::new(&header.asset, None, None, None, None);
@@ -140,9 +132,6 @@ pub fn has_scores(dir: &Path) -> bool {
 
 /// Writes `episodes.csv`, `summary.json` and `thresholds.json` of one suite's `records` below the run folder `dir`. The
 /// thresholds are those on SoftVTBench's D ([`ThresholdFile::released`]).
-///
-/// # Errors
-/// A file cannot be written.
 pub fn write_scores(
     dir: &Path,
     records: &[EpisodeRecord],
@@ -152,7 +141,7 @@ pub fn write_scores(
     let scored: Vec<ScoredEpisode> =
         in_order(records).into_iter().map(|r| ScoredEpisode::new(r, thresholds)).collect();
     replace(&folder.join(EPISODES_CSV), episodes_csv(&scored))?;
-    replace(&folder.join(SUMMARY_JSON), format!("{:#}\n", summary(&scored)))?;
+    files::write_json(&folder.join(SUMMARY_JSON), &summary(&scored))?;
     replace(&folder.join(THRESHOLDS_JSON), thresholds.to_text())
 }
 

@@ -1,8 +1,8 @@
 //! Summary of a run (`summary.json`): rates and distributions over its episodes.
 //!
-//! Rates are in percent over *all* episodes: an invalid episode, or one with missing evidence, counts as a failure.
-//! What was judged in no episode has no rate. Distributions of D are over all episodes with a soft target: means over
-//! the valid ones, percentiles with invalid ones ranked as worst.
+//! Rates are in percent over *all* episodes: an invalid episode, or one with missing evidence, counts as a failure. A
+//! quantity that was judged in no episode has no rate. Distributions of D are over all episodes with a soft target:
+//! means over the valid ones, percentiles with invalid ones ranked as worst.
 
 use std::collections::BTreeMap;
 
@@ -22,14 +22,12 @@ const KAPPA_STEPS: u32 = 20;
 /// Smallest and largest τ of some episodes, %.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct TauRange {
-    /// Smallest τ.
     pub min: f64,
-    /// Largest τ.
     pub max: f64,
 }
 
 impl TauRange {
-    /// Those of the soft targets; `None` without any.
+    /// The range for the soft targets; `None` without any.
     pub(crate) fn new<'a>(records: impl Iterator<Item = &'a EpisodeRecord>) -> Option<Self> {
         let taus: Vec<f64> =
             records.flat_map(EpisodeRecord::soft_targets).filter_map(|target| target.tau).collect();
@@ -49,16 +47,12 @@ pub struct RatesAtKappa {
     pub safety_success_rate: Rate,
 }
 
-/// Scores of one task.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct TaskScores {
-    /// Index of the task in the suite.
     pub task: usize,
-    /// Instruction given to the policy.
     pub prompt: String,
     /// Asset of the target in the first episode.
     pub asset: String,
-    /// Scores of its episodes.
     #[serde(flatten)]
     pub scores: GroupScores,
 }
@@ -70,48 +64,28 @@ pub struct AssetScores {
     pub tau: Option<f64>,
     /// D_ref of the asset, %.
     pub d_ref: Option<f64>,
-    /// Scores of its episodes.
     #[serde(flatten)]
     pub scores: GroupScores,
 }
 
-/// Episode that its controller aborted.
+/// Episode that its controller aborted or that is invalid, and why.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct AbortedEpisode {
-    /// Index of the task.
+pub struct FailedEpisode {
     pub task: usize,
-    /// Index of the episode in the task.
     pub episode: u32,
-    /// Reason given by the controller.
     pub reason: String,
 }
 
-/// Invalid episode with its reason.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct InvalidEpisode {
-    /// Index of the task.
-    pub task: usize,
-    /// Index of the episode in the task.
-    pub episode: u32,
-    /// Reason why it is invalid.
-    pub reason: String,
-}
-
-/// Episode of more than one attempt.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct RepeatedEpisode {
-    /// Index of the task.
     pub task: usize,
-    /// Index of the episode in the task.
     pub episode: u32,
-    /// Number of attempts.
     pub attempts: u32,
 }
 
 /// Commands of the policy that were not executed as given.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct CommandCounts {
-    /// Number of all commands.
     pub steps: u64,
     /// Number of commands that were out of reach.
     pub far: u64,
@@ -130,7 +104,6 @@ pub struct CommandCounts {
 }
 
 impl CommandCounts {
-    /// Counts of some episodes.
     fn from_records(records: &[&EpisodeRecord]) -> Self {
         let stats = || records.iter().map(|r| &r.stats);
         Self {
@@ -149,9 +122,7 @@ impl CommandCounts {
 /// Contents of `summary.json`: one suite, one policy.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct SuiteSummary {
-    /// Name of the suite.
     pub suite: String,
-    /// Name of the policy.
     pub policy: String,
     /// True if the policy saw the true state in any episode, as experts do.
     pub privileged: bool,
@@ -162,7 +133,6 @@ pub struct SuiteSummary {
     pub force_observed: bool,
     /// True if Safety Success needed NoSlip.
     pub no_slip_required: bool,
-    /// Commands that were not executed as given.
     pub commands: CommandCounts,
     /// Scores of all episodes together.
     #[serde(flatten)]
@@ -171,14 +141,13 @@ pub struct SuiteSummary {
     pub kappa: Vec<RatesAtKappa>,
     /// Scores by task, in order.
     pub by_task: Vec<TaskScores>,
-    /// Scores by asset of the target.
     pub by_asset: BTreeMap<String, AssetScores>,
     /// Episodes that the controller aborted, in order.
     #[serde(skip_serializing_if = "Vec::is_empty")]
-    pub gave_up: Vec<AbortedEpisode>,
+    pub gave_up: Vec<FailedEpisode>,
     /// Invalid episodes, in order.
     #[serde(skip_serializing_if = "Vec::is_empty")]
-    pub invalid_episodes: Vec<InvalidEpisode>,
+    pub invalid_episodes: Vec<FailedEpisode>,
     /// Episodes of more than one attempt, in order.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub repeated_episodes: Vec<RepeatedEpisode>,
@@ -188,7 +157,6 @@ pub struct SuiteSummary {
 }
 
 impl GroupScores {
-    /// True if a target deforms.
     pub fn is_soft(&self) -> bool {
         self.deformation_ok_rate.is_some()
     }
@@ -198,12 +166,10 @@ impl GroupScores {
         if self.is_soft() { self.safety_success_rate } else { Rate::default() }
     }
 
-    /// Number of episodes of a category.
     pub fn count(&self, category: EpisodeCategory) -> usize {
         self.categories.get(&category).copied().unwrap_or(0)
     }
 
-    /// Scores of `records`.
     pub fn from_records(records: &[&EpisodeRecord]) -> Self {
         Self::new(&Episodes { records, tasks: None })
     }
@@ -226,7 +192,7 @@ impl SuiteSummary {
         };
         let aborted = |r: &&EpisodeRecord| {
             let (task, episode) = (r.header.id.task, r.header.id.episode);
-            r.stats.gave_up.clone().map(|reason| AbortedEpisode { task, episode, reason })
+            r.stats.gave_up.clone().map(|reason| FailedEpisode { task, episode, reason })
         };
         let invalid = |r: &&EpisodeRecord| {
             let (task, episode) = (r.header.id.task, r.header.id.episode);
@@ -235,7 +201,7 @@ impl SuiteSummary {
                 Outcome::Error { message } => message.clone(),
                 Outcome::Completed | Outcome::Budget => return None,
             };
-            Some(InvalidEpisode { task, episode, reason })
+            Some(FailedEpisode { task, episode, reason })
         };
         let repeated = |r: &&EpisodeRecord| {
             let EpisodeIndex { task, episode } = r.header.id.index();

@@ -12,7 +12,7 @@ use super::{
 };
 use crate::{
     schema::{
-        Constructed, FromChecked, HasTable, Record, RecordType, Type, check::invalid, functions,
+        Constructed, HasTable, LuaType, Record, RecordType, Type, ValidationError, check::Checker, functions,
         is_constructed, one_of, record, record_of,
     },
     vm::error::{app_data, fail},
@@ -22,7 +22,6 @@ use softvt_physics::{contact::Friction, fem::ElasticMaterial};
 use softvt_rollout::{AssetCache, asset_warnings};
 use softvt_scene::{Asset, Body, SoftMaterial, Visual};
 
-/// A coefficient of friction.
 pub(crate) const COEFFICIENT: Type = Type::Number("", Friction::COEFFICIENT);
 pub(crate) const PASCALS: Type = Type::Number("Pa", ElasticMaterial::YOUNGS_PA);
 pub(crate) const POISSON: Type = Type::Number("", ElasticMaterial::POISSON);
@@ -32,7 +31,7 @@ pub(crate) const DENSITY: Type = Type::Number("kg/m³", ElasticMaterial::DENSITY
 record_of! {
     /// Coulomb friction of a surface. A pair of surfaces has the larger of each coefficient, unless one is coated.
     Friction: "softvt.Friction" as "friction", relation NotDecreasing(&["dynamic_mu", "static_mu"]) {
-        /// Static coefficient.
+        /// Static coefficient, 0 for none.
         static_mu: f64 = COEFFICIENT => Number(Friction::STANDARD.static_mu);
         /// Dynamic coefficient, at most the static one.
         dynamic_mu: f64 = COEFFICIENT => Number(Friction::STANDARD.dynamic_mu);
@@ -45,7 +44,7 @@ record_of! {
         youngs_pa: f64 = PASCALS;
         /// Poisson's ratio; 0.5 would be incompressible.
         poisson: f64 = POISSON;
-        /// Density.
+        /// Density of the solid part.
         density: f64 = DENSITY;
         /// Voxels along the longest edge of the bounding box.
         resolution: usize = Type::Integer(SoftMaterial::RESOLUTION) => Integer(6);
@@ -56,28 +55,15 @@ record_of! {
         collapse_strain: Option<f64> = STRAIN;
         /// Compressive strain that leaves a visible crack or set.
         damage_strain: Option<f64> = STRAIN;
-    } by soft_material;
-}
-
-fn soft_material(
-    lua: &Lua,
-    youngs_pa: f64,
-    poisson: f64,
-    density: f64,
-    resolution: usize,
-    grasp_spacing: f64,
-    collapse_strain: Option<f64>,
-    damage_strain: Option<f64>,
-) -> mlua::Result<SoftMaterial> {
-    let elastic = ElasticMaterial::new(youngs_pa, poisson, density)
-        .map_err(|error| fail(lua, format!("{}.{error}", SoftMaterial::RECORD.label)))?;
-    Ok(SoftMaterial { elastic, resolution, grasp_spacing, collapse_strain, damage_strain })
+    } by |lua| ElasticMaterial::new(youngs_pa, poisson, density)
+        .map_err(|error| fail!(lua, "{}.{error}", SoftMaterial::RECORD.label))
+        .map(|elastic| SoftMaterial { elastic, resolution, grasp_spacing, collapse_strain, damage_strain });
 }
 
 record! {
     /// A free rigid body of uniform density.
     RigidSpec: "softvt.Rigid" as "asset.body", constructor "softvt.rigid" {
-        /// Density.
+        /// Density of the whole volume.
         density: f64 = DENSITY;
     }
     /// A fixed body, which never moves.
@@ -91,7 +77,7 @@ record! {
         name: String = Type::Name;
         /// Shape, in metres.
         shape: LuaShape;
-        /// Mechanics.
+        /// Mechanics: soft, rigid, articulated, static or scenery.
         body: BodySpec;
         /// Friction of its surface.
         friction: Friction;
@@ -116,19 +102,18 @@ pub(crate) static CONSTRUCTORS: &[&Record] =
 /// Longest side of an object that a robot handles, m. More is nearly always another unit.
 const MAX_SIZE: f64 = 10.0;
 
-fn check_asset(lua: &Lua, record: &Record, asset: &Table) -> mlua::Result<()> {
-    let shape: LuaShape = FromChecked::from_checked(asset.raw_get("shape")?, lua)?;
-    let body: BodySpec = FromChecked::from_checked(asset.raw_get("body")?, lua)?;
+fn check_asset(lua: &Lua, asset: &Table) -> Result<(), ValidationError> {
+    let shape: LuaShape = LuaType::from_checked(asset.raw_get("shape")?, lua)?;
+    let body: BodySpec = LuaType::from_checked(asset.raw_get("body")?, lua)?;
     let (is_handled, shape) = (matches!(body, BodySpec::Soft(_) | BodySpec::Rigid(_)), shape.copy());
     let cache = app_data::<AssetCache>(lua)?;
     let size = || cache.bounds(&shape).size();
     if is_handled && shape.loose_bounds().size().max() > MAX_SIZE && size().max() > MAX_SIZE {
         let size = size();
         let [x, y, z] = [size.x, size.y, size.z].map(|side| format_number((1e3 * side).round() / 1e3));
-        let message = format!(
-            "is {x} × {y} × {z} m, expected at most {MAX_SIZE} m; lengths are in metres (softvt.mesh takes scale = 0.001 for mm)"
-        );
-        return Err(invalid(lua, record.label, "shape", message));
+        let hint = "lengths are in metres (softvt.mesh takes scale = 0.001 for mm)";
+        let error = mismatch!("is {x} × {y} × {z} m, expected at most {MAX_SIZE} m; {hint}");
+        return Err(error.inside("shape"));
     }
     // An episode can use only files that were found when the script was loaded.
     find_calibration(lua, &asset.raw_get::<String>("name")?)
@@ -164,9 +149,11 @@ functions! {
         /// Returns what is most likely a mistake in an asset, as softvt check tells it.
         fn asset_warnings(lua, asset: Constructed<AssetSpec>) -> ["string[]"] {
             let body = asset.body.table();
-            let record = BodySpec::RECORDS.iter().find(|record| is_constructed(lua, record, body));
-            let unusual = record.into_iter().flat_map(|record| record.unusual(body));
-            let unusual = unusual.map(|found| found.describe("body"));
+            let mut checker = Checker::new(lua);
+            for record in BodySpec::RECORDS.iter().filter(|record| is_constructed(lua, record, body)) {
+                checker.record(record, body).map_err(|error| fail(lua, error.describe("body")))?;
+            }
+            let unusual = checker.unusual.iter().map(|found| found.describe("body"));
             unusual.chain(asset_warnings(&asset.asset(lua)?, &app_data::<AssetCache>(lua)?.approximate())).collect::<Vec<_>>()
         }
     }

@@ -10,7 +10,7 @@ use super::{
 };
 use crate::{
     schema::{Range, Type, choice, class, object::read_only_list, record},
-    vm::error::{current_line, fail},
+    vm::error::current_line,
 };
 use softvt_common::parallel::lock;
 use softvt_geometry::{Pose, Quat, Vec3};
@@ -21,7 +21,6 @@ const BRIGHTNESS: Range = Range::closed(0.0, 1000.0).usually(0.0, 50.0);
 const FIELD_OF_VIEW: Type = Type::Number("rad", Range::closed(0.01, 2.8));
 const NEAR: Type = Type::Number("m", Range::closed(1e-4, 100.0));
 const FAR: Type = Type::Number("m", Range::closed(1e-3, 1e4).usually(0.15, 1e3));
-/// Width or height of a camera's image.
 pub(crate) const IMAGE_EDGE: Type = Type::Integer(Range::closed(1.0, 4096.0));
 const LIGHT_COLOUR: Type = Type::colour(20.0);
 const POINT: Type =
@@ -37,7 +36,7 @@ record! {
         name: String = Type::Name;
         /// Frame that the camera is fixed to; hand is panda_hand.
         mount: CameraMount => Text("world");
-        /// Position.
+        /// Position of its centre.
         position: [f64; 3] = POINT;
         /// A point in the middle of the image.
         look_at: Option<[f64; 3]> = POINT;
@@ -47,9 +46,9 @@ record! {
         quaternion: Option<[f64; 4]> = ORIENTATION;
         /// Vertical field of view.
         fovy: f64 = FIELD_OF_VIEW => Number(0.8);
-        /// Nearest visible distance.
+        /// Distance of the nearest visible point.
         near: f64 = NEAR => Number(0.01);
-        /// Farthest visible distance.
+        /// Distance of the farthest visible point.
         far: f64 = FAR => Number(20.0);
         /// Width of the image, pixels.
         width: usize = IMAGE_EDGE => Integer(224);
@@ -60,7 +59,6 @@ record! {
 
 type SharedScene = Arc<Mutex<Scene>>;
 
-/// `softvt.Light`.
 #[derive(Clone)]
 pub(crate) struct LuaLight(pub SharedScene);
 
@@ -121,13 +119,12 @@ fn look_at(lua: &Lua, label: &str, from: &Vec3, point: [f64; 3], up: Option<[f64
         Some(up) => Ok(Quat::face_towards(&-ahead, &up)),
         None => {
             let message = "expected a point away from the camera, not straight along up; give another up";
-            Err(fail(lua, format!("{label}: {message}")))
+            Err(fail!(lua, "{label}: {message}"))
         }
     }
 }
 
 impl LuaCamera {
-    /// The scene's camera of a name.
     pub(crate) fn named(lua: &Lua, scene: &SharedScene, name: &str) -> mlua::Result<Self> {
         let inner = lock(scene);
         let names = inner.cameras.iter().map(|camera| camera.name.as_str());
@@ -135,24 +132,21 @@ impl LuaCamera {
         Ok(Self { scene: scene.clone(), index })
     }
 
-    /// Adds a camera to the scene.
     pub(crate) fn add(lua: &Lua, scene: &SharedScene, spec: CameraSpec) -> mlua::Result<Self> {
         const LABEL: &str = "scene:add_camera";
         let position = Vec3::from(spec.position);
         let rotation = match (spec.look_at, spec.quaternion) {
             (Some(point), None) => look_at(lua, &format!("{LABEL}.look_at"), &position, point, spec.up)?,
             (None, Some(numbers)) => rotation_from_wxyz(numbers).unwrap_or_default(),
-            _ => return Err(fail(lua, format!("{LABEL}: give either look_at or quaternion"))),
+            _ => return Err(fail!(lua, "{LABEL}: give either look_at or quaternion")),
         };
         let mut inner = lock(scene);
         if inner.camera(&spec.name).is_some() {
             let name = &spec.name;
-            let message =
-                format!("{LABEL}: there is a camera {name:?} already; change it by scene:camera({name:?})");
-            return Err(fail(lua, message));
+            bail!(lua, "{LABEL}: there is a camera {name:?} already; change it by scene:camera({name:?})");
         }
         if inner.cameras.len() >= MAX_CAMERAS {
-            return Err(fail(lua, format!("{LABEL}: a scene has at most {MAX_CAMERAS} cameras")));
+            bail!(lua, "{LABEL}: a scene has at most {MAX_CAMERAS} cameras");
         }
         inner.cameras.push(Camera {
             name: spec.name,
@@ -189,13 +183,13 @@ class! {
     LuaCamera: "softvt.Camera" {
         label(this) { this.name() }
         fields {
-            /// Name.
+            /// Name in the scene.
             name: "string" { get(_, this) { this.read(|camera| camera.name.clone()) } }
             /// Frame that the camera is fixed to.
             mount: "\"world\"|\"hand\"" { get(_, this) { this.read(|camera| camera.mount) } }
         }
         writable {
-            /// Position.
+            /// Position of its centre.
             position: POINT => pose.translation.vector;
             /// Orientation: the camera looks along its −z axis, and +y is up in the image.
             quaternion: ORIENTATION => {
@@ -209,9 +203,9 @@ class! {
             }
             /// Vertical field of view.
             fovy: FIELD_OF_VIEW => fovy_rad;
-            /// Nearest visible distance.
+            /// Distance of the nearest visible point.
             near: NEAR => near_m;
-            /// Farthest visible distance.
+            /// Distance of the farthest visible point.
             far: FAR => far_m;
             /// Width of the image, pixels.
             width: IMAGE_EDGE => width;

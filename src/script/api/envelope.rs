@@ -1,7 +1,6 @@
 //! The safe interaction envelope: results of a calibration from its rows, and the windows of instances.
 
 use std::{
-    cell::RefCell,
     collections::BTreeMap,
     sync::{Arc, Mutex},
 };
@@ -13,10 +12,9 @@ use super::{
     assets::{AssetSpec, STRAIN},
     envelope_plot::envelope_plot,
     scene::COATING,
-    tasks::VariationSpec,
 };
 use crate::{
-    schema::{Constructed, Range, Type, Unchecked, choice, functions, output},
+    schema::{Constructed, Range, Type, Unchecked, ValidationError, choice, functions, output},
     vm::{
         error::{app_data, fail},
         json::deserialize,
@@ -24,7 +22,7 @@ use crate::{
         privilege::check_privilege,
     },
 };
-use softvt_benchmark::variation::{DrawPressLookup, DrawPresses, VariationError, VariationRanges};
+use softvt_benchmark::variation::{DrawPresses, VariationError, VariationRanges};
 use softvt_common::parallel::lock;
 use softvt_evaluation::{
     calibration::{
@@ -40,29 +38,22 @@ use softvt_robot::spec::PadSpec;
 use softvt_rollout::AssetCache;
 use softvt_scene::{Asset, HiddenProperties, LENGTH_HINT, ObjectVariation};
 
-/// Largest number of instances of a sample.
 pub(crate) const MAX_SAMPLE: f64 = 10_000.0;
-/// A factor between an instance and its asset.
 const FACTOR: Type = Type::Number("", Range::POSITIVE);
 
-/// Calibrated assets of a virtual machine, by name.
+/// Calibrations by asset, as far as a virtual machine has read them.
 #[derive(Clone, Default)]
-struct CalibratedAssets(Arc<Mutex<BTreeMap<String, Option<CalibratedAsset>>>>);
+pub(crate) struct CalibratedAssets(Arc<Mutex<BTreeMap<String, Option<CalibratedAsset>>>>);
 
-/// A calibrated asset, as its instances need it.
 #[derive(Clone)]
 pub(crate) struct CalibratedAsset {
     /// Limits and windows of its instances.
     pub presses: Arc<InstancePresses>,
-    /// Fingerprint of the asset that was calibrated.
     fingerprint: Option<String>,
 }
 
 /// The calibration of an asset, read once per virtual machine; `None` if it has none.
 pub(crate) fn calibrated_asset(lua: &Lua, asset: &str) -> mlua::Result<Option<CalibratedAsset>> {
-    if lua.app_data_ref::<CalibratedAssets>().is_none() {
-        lua.set_app_data(CalibratedAssets::default());
-    }
     let assets = app_data::<CalibratedAssets>(lua)?;
     if let Some(known) = lock(&assets.0).get(asset) {
         return Ok(known.clone());
@@ -85,7 +76,7 @@ fn reference_path(asset: &str) -> String {
 
 /// The presses by which instances of an asset are drawn; `None` without a file of them for this object.
 fn draw_reference(lua: &Lua, asset: &Asset) -> mlua::Result<Option<InstancePresses>> {
-    let wrong = |error: String| fail(lua, format!("asset {:?}: {error}", asset.name));
+    let wrong = |error: String| fail!(lua, "asset {:?}: {error}", asset.name);
     let library = app_data::<SharedLibrary>(lua)?;
     let found = lock(&library).optional_data(&reference_path(&asset.name));
     let Some(FoundFile { name, bytes }) = found.map_err(|error| wrong(error.to_string()))? else {
@@ -96,18 +87,9 @@ fn draw_reference(lua: &Lua, asset: &Asset) -> mlua::Result<Option<InstancePress
     Ok((file.object == asset.object_fingerprint()).then_some(file.presses))
 }
 
-/// Calls `draw` with the presses of assets.
-///
-/// # Errors
-/// A calibration or a draw reference cannot be read. The inner error is that of `draw`.
-pub(crate) fn draw<T>(
-    lua: &Lua,
-    draw: impl FnOnce(&DrawPressLookup<'_>) -> Result<T, VariationError>,
-) -> mlua::Result<Result<T, VariationError>> {
-    let broken = RefCell::new(None);
-    // A fingerprint takes milliseconds, and a sample asks for one asset many times.
-    let known = RefCell::new(BTreeMap::<*const Asset, Option<DrawPresses>>::new());
-    let find = |asset: &Asset| -> mlua::Result<Option<DrawPresses>> {
+/// The presses by which instances of an asset are drawn and those by which their windows are stated.
+pub(crate) fn draw_presses(lua: &Lua, asset: &Asset) -> Result<Option<DrawPresses>, VariationError> {
+    let find = || -> mlua::Result<Option<DrawPresses>> {
         // A calibration of another version of the asset does not count, as for its limit.
         let fits = |found: &CalibratedAsset| {
             found.fingerprint.as_ref().is_none_or(|known| *known == asset.fingerprint())
@@ -116,23 +98,10 @@ pub(crate) fn draw<T>(
         let presses = |reference| DrawPresses { reference: Arc::new(reference), calibrated: found.presses };
         Ok(draw_reference(lua, asset)?.map(presses))
     };
-    let drawn = draw(&|asset| {
-        let found = || match find(asset) {
-            Ok(found) => found,
-            Err(error) => {
-                broken.replace(Some(error));
-                None
-            }
-        };
-        known.borrow_mut().entry(std::ptr::from_ref(asset)).or_insert_with(found).clone()
-    });
-    match broken.into_inner() {
-        Some(error) => Err(error),
-        None => Ok(drawn),
-    }
+    find().map_err(|error| VariationError::NoInstance(error.to_string()))
 }
 
-/// Draws `count` instances of an asset as the suite does; see [`VariationRanges::sample`].
+/// Draws `count` instances of an asset as the suite does; see [`VariationRanges::sample_instances`].
 pub(crate) fn sample(
     lua: &Lua,
     suite: &str,
@@ -143,9 +112,8 @@ pub(crate) fn sample(
     let size = app_data::<AssetCache>(lua)?.bounds(&asset.shape).size();
     let state = |drawn: Option<&ObjectVariation>| instance_state(lua, &Instance { asset, size, drawn });
     let Some(ranges) = ranges else { return (0..count).map(|_| state(None)).collect() };
-    let drawn = draw(lua, |presses_of| ranges.sample_instances(suite, asset, count, presses_of))?;
-    let drawn = drawn.map_err(|error| fail(lua, error.to_string()))?;
-    drawn.iter().map(|one| state(Some(one))).collect()
+    let drawn = ranges.sample_instances(suite, asset, count, &|asset| draw_presses(lua, asset));
+    drawn.map_err(|error| fail(lua, error))?.iter().map(|one| state(Some(one))).collect()
 }
 
 /// An instance by what it differs in from its asset.
@@ -200,12 +168,12 @@ fn calibration_path(asset: &str) -> String {
 
 /// Finds the calibration and the draw reference of an asset, so that the episodes of the script have them. An asset
 /// that is made during an episode has none unless they were found before.
-pub(crate) fn find_calibration(lua: &Lua, asset: &str) -> mlua::Result<()> {
+pub(crate) fn find_calibration(lua: &Lua, asset: &str) -> Result<(), ValidationError> {
     let library = app_data::<SharedLibrary>(lua)?;
     for path in [calibration_path(asset), reference_path(asset)] {
         match lock(&library).optional_data(&path) {
-            Ok(_) | Err(LibraryError::LateFile { .. }) => {}
-            Err(error) => return Err(fail(lua, format!("asset {asset:?}: {error}"))),
+            Ok(_) | Err(LibraryError::Late(_)) => {}
+            Err(error) => return Err(ValidationError::new(error).inside("name")),
         }
     }
     Ok(())
@@ -214,19 +182,16 @@ pub(crate) fn find_calibration(lua: &Lua, asset: &str) -> mlua::Result<()> {
 /// Reads assets/calibration/<asset>.json; returns its path as messages show it and its content.
 fn calibration_file(lua: &Lua, label: &str, asset: &str) -> mlua::Result<Option<(String, ThresholdFile)>> {
     let library = app_data::<SharedLibrary>(lua)?;
-    let found = lock(&library)
-        .optional_data(&calibration_path(asset))
-        .map_err(|e| fail(lua, format!("{label}: {e}")))?;
+    let found =
+        lock(&library).optional_data(&calibration_path(asset)).map_err(|e| fail!(lua, "{label}: {e}"))?;
     let Some(FoundFile { name: path, bytes }) = found else { return Ok(None) };
     // Every virtual machine reads the files; comparing the rows takes most of that time.
     let is_built_in = embedded(&calibration_path(asset)).is_some_and(|own| own == &bytes[..]);
     let parse = if is_built_in { ThresholdFile::parse_built_in } else { ThresholdFile::parse };
-    let file =
-        parse(&String::from_utf8_lossy(&bytes), &path).map_err(|e| fail(lua, format!("{label}: {e}")))?;
+    let file = parse(&String::from_utf8_lossy(&bytes), &path).map_err(|e| fail!(lua, "{label}: {e}"))?;
     Ok(Some((path, file)))
 }
 
-/// Type of a list of rows.
 const ROWS: Type = Type::List(&Type::Map(&Type::Any));
 
 output! {
@@ -237,9 +202,6 @@ output! {
         /// Force per pad, N; nil if the sweep does not reach the width.
         force_n: "number?" = end.force_n;
     }
-}
-
-output! {
     /// The safe window of an asset.
     fn window_table(lua, window: &SafeWindow) -> "softvt.SafeWindow" as "window" {
         /// Loose end: the widest width at which every hold trial held.
@@ -249,14 +211,11 @@ output! {
         /// Extent of the window, mm; nil if it is empty.
         extent_mm: "number?" = window.extent_mm();
     }
-}
-
-output! {
     /// Results of a calibration.
     fn envelope_table(lua, asset: &str, envelope: &Envelope, file: &ThresholdFile) -> "softvt.Envelope" as "envelope" {
-        /// How the sweep was made: "press" or "hand".
+        /// Protocol of the sweep: "press" or "hand".
         protocol: "string" = lua.to_value(&envelope.protocol)?;
-        /// The safe window.
+        /// Loose and tight end of the safe window.
         window: "softvt.SafeWindow" = window_table(lua, &envelope.window)?;
         /// Widest width at which both pads touched, mm.
         width_contact_mm: "number?" = envelope.width_contact_mm;
@@ -283,9 +242,6 @@ output! {
         /// The same as a table.
         table: "table" = lua.to_value(file)?;
     }
-}
-
-output! {
     /// A grip at rest.
     fn grip_table(lua, grip: &GripAtRest) -> "softvt.Grip" as "grip" {
         /// Distance of the gels, m.
@@ -293,9 +249,6 @@ output! {
         /// Normal force per pad, N.
         force: "number" = grip.force_n;
     }
-}
-
-output! {
     /// The safe window of an instance.
     fn instance_window_table(lua, window: &InstanceWindow) -> "softvt.InstanceWindow" as "window" {
         /// The loosest grip that holds.
@@ -331,7 +284,7 @@ functions! {
         fn envelope(lua) takes spec "softvt.EnvelopeSpec" {
             /// Name of the asset.
             asset: String = Type::Name;
-            /// How the sweep was made.
+            /// Protocol of the sweep.
             protocol: SweepProtocol => Text("press");
             /// Safety factor κ of the deformation limit τ = κ D_ref.
             kappa: f64 = Type::Number("", Range::closed(0.0, 1.0)) => Number(0.5);
@@ -374,8 +327,7 @@ functions! {
                 None => None,
                 Some((path, file)) => {
                     let Some(envelope) = file.envelopes.get(&asset) else {
-                        let message = format!("{label}: {path} has no rows of {asset}; calibrate it again");
-                        return Err(fail(lua, message));
+                        bail!(lua, "{label}: {path} has no rows of {asset}; calibrate it again");
                     };
                     Some(envelope_table(lua, &asset, envelope, &file)?)
                 }
@@ -386,7 +338,7 @@ functions! {
         fn draw_reference(lua, asset: Constructed<AssetSpec>, calibration: Unchecked = Type::Text) -> ["string?"] {
             let (label, asset) = ("softvt.draw_reference", asset.asset(lua)?);
             let text: String = deserialize(lua, label, &calibration.0)?;
-            let file = ThresholdFile::parse(&text, "calibration").map_err(|e| fail(lua, format!("{label}: {e}")))?;
+            let file = ThresholdFile::parse(&text, "calibration").map_err(|e| fail!(lua, "{label}: {e}"))?;
             let of_calibration = presses_of(&file, &asset.name).filter(|found| found.window(&InstanceFactors::NOMINAL).is_some());
             match (draw_reference(lua, &asset)?, of_calibration) {
                 (None, Some(presses)) => {
@@ -421,18 +373,17 @@ functions! {
         /// Returns instances of an asset as the episodes of a suite draw them, from a random stream that no episode
         /// uses. Without a variation each is the asset itself.
         fn sample_instances(lua) takes spec "softvt.Sample" {
-            /// The asset.
+            /// Asset of the instances.
             asset: Constructed<AssetSpec>;
             /// Variation of the suite.
-            variation: Option<Constructed<VariationSpec>>;
+            variation: Option<Constructed<VariationRanges>>;
             /// Name of the suite; part of the seed.
             suite: String = Type::Name;
-            /// Number of instances.
+            /// Number of instances to draw.
             count: u32 = Type::Integer(Range::closed(1.0, MAX_SAMPLE));
         } -> ["softvt.InstanceState[]"] {
             check_privilege(lua, "softvt.sample_instances")?;
-            let ranges = variation.map(|variation| variation.ranges());
-            sample(lua, &suite, ranges.as_ref(), &asset.asset(lua)?, count)?
+            sample(lua, &suite, variation.as_deref(), &asset.asset(lua)?, count)?
         }
         /// Returns true if a row of a compression sweep is a stable squeeze.
         fn stable(lua, row: Unchecked = Type::Table("table")) -> ["boolean"] {

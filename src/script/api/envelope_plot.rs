@@ -10,7 +10,7 @@ use softvt_media::{
     drawing::Symbol,
 };
 
-/// The image, with room for the ends of the window above the chart.
+/// The image, with space for the ends of the window above the chart.
 const LAYOUT: Layout = Layout {
     panel: [640.0, 340.0],
     margins: Margins { top: 62.0, ..Layout::SINGLE.margins },
@@ -89,7 +89,6 @@ mod tests {
     use super::*;
     use softvt_evaluation::{calibration::CalibrationMeasurements, thresholds::ThresholdFile};
 
-    /// The envelope of a standard asset.
     fn calibrated() -> Envelope {
         let text = include_str!("../../../assets/calibration/braided_roll.json");
         let mut file = ThresholdFile::parse(text, "braided_roll.json").expect("a calibration");

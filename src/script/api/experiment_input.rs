@@ -23,34 +23,23 @@ pub struct ExperimentInput {
     row_text: AtomicUsize,
 }
 
-/// An input that is not valid, or that would change nothing. Its text does not name the input, see
-/// [`ExperimentInputError::path`].
+/// An input that is not valid, or that would change nothing.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
-#[allow(missing_docs, reason = "the messages describe the variants")]
-pub enum ExperimentInputError {
-    #[error("{0}")]
-    Settings(#[from] SettingsError),
-    #[error("an experiment judges no episodes; leave it out")]
-    Criteria { path: String },
-    #[error("the experiment simulates no robot (softvt.simulate), so this changes nothing; leave it out")]
-    NoRobot { path: String },
-    #[error("the experiment simulates nothing, so this changes nothing; leave it out")]
-    NoPhysics { path: String },
-    #[error("the experiment draws no random numbers, so this changes nothing; leave it out")]
-    NoRandomNumbers,
+#[error("{message}")]
+pub struct ExperimentInputError {
+    /// "settings" or "seed".
+    pub input: &'static str,
+    /// Path of a setting; empty where the message names it.
+    pub path: String,
+    message: String,
 }
 
 impl ExperimentInputError {
-    /// Path of the setting that would change nothing. `None` for the seed, and for a setting that the text names.
-    pub fn path(&self) -> Option<&str> {
-        match self {
-            Self::Criteria { path } | Self::NoRobot { path } | Self::NoPhysics { path } => Some(path),
-            Self::Settings(_) | Self::NoRandomNumbers => None,
-        }
+    fn unused(input: &'static str, path: &str, reason: &str) -> Self {
+        Self { input, path: path.to_owned(), message: format!("{reason}; leave it out") }
     }
 }
 
-/// The group of settings that a path begins with.
 fn group(path: &str) -> &str {
     path.split('.').next().unwrap_or(path)
 }
@@ -61,9 +50,15 @@ impl ExperimentInput {
     /// # Errors
     /// A setting does not exist, has a value out of its range, or concerns the judge.
     pub fn new(set: Vec<(String, String)>, seed: u64) -> Result<Self, ExperimentInputError> {
-        Settings::default().with_all(&set)?;
+        Settings::default().with_all(&set).map_err(|error| ExperimentInputError {
+            input: "settings",
+            path: String::new(),
+            message: error.to_string(),
+        })?;
         match set.iter().find(|(path, _)| group(path) == "criteria") {
-            Some((path, _)) => Err(ExperimentInputError::Criteria { path: path.clone() }),
+            Some((path, _)) => {
+                Err(ExperimentInputError::unused("settings", path, "an experiment judges no episodes"))
+            }
             None => Ok(Self { set, seed, ..Self::default() }),
         }
     }
@@ -74,25 +69,23 @@ impl ExperimentInput {
     /// A setting or seed that changed nothing.
     pub fn check_used(&self) -> Result<(), ExperimentInputError> {
         let has = |flag: &AtomicBool| flag.load(Ordering::Relaxed);
-        for (path, _) in &self.set {
-            let path = path.clone();
-            if has(&self.has_simulation) {
-                break;
-            }
-            if group(&path) != "physics" {
-                return Err(ExperimentInputError::NoRobot { path });
-            }
-            if !has(&self.has_world) {
-                return Err(ExperimentInputError::NoPhysics { path });
+        let unused = |path: &str| match group(path) {
+            "physics" if has(&self.has_world) => None,
+            "physics" => Some("the experiment simulates nothing, so this changes nothing"),
+            _ => Some("the experiment simulates no robot (softvt.simulate), so this changes nothing"),
+        };
+        for (path, _) in self.set.iter().filter(|_| !has(&self.has_simulation)) {
+            if let Some(reason) = unused(path) {
+                return Err(ExperimentInputError::unused("settings", path, reason));
             }
         }
         if self.seed != 0 && !has(&self.has_random) {
-            return Err(ExperimentInputError::NoRandomNumbers);
+            let reason = "the experiment draws no random numbers, so this changes nothing";
+            return Err(ExperimentInputError::unused("seed", "", reason));
         }
         Ok(())
     }
 
-    /// Key of the random numbers of a point.
     pub(crate) fn point_key(&self, index: usize) -> [String; 2] {
         [index.to_string(), self.seed.to_string()]
     }
@@ -112,7 +105,6 @@ fn input(lua: &Lua) -> Arc<ExperimentInput> {
     lua.app_data_ref::<Arc<ExperimentInput>>().map_or_else(Arc::default, |input| Arc::clone(&input))
 }
 
-/// The settings of a simulation with those of the run.
 pub(crate) fn simulation_settings(lua: &Lua, settings: &Settings) -> Result<Settings, SettingsError> {
     let input = input(lua);
     input.has_simulation.store(true, Ordering::Relaxed);

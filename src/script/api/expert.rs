@@ -9,9 +9,7 @@ use mlua::{Function, IntoLua, Lua, MultiValue, Table, Thread, Value, chunk::Chun
 
 use super::{
     envelope::{MAX_SAMPLE, sample},
-    expert_input::{
-        ExpertCommand, ExpertInput, ExpertView, ObjectView, SuiteInstances, TrackingErrorMonitor,
-    },
+    expert_input::{ExpertCommand, ExpertView, ObjectView, SuiteInstances, TrackingErrorMonitor},
     index_of,
     observation::{FingerReadings, fingers},
     pose::LuaPose,
@@ -34,9 +32,8 @@ use softvt_robot::{
     Obstacle, clearance,
     gripper::{MAX_FORCE, MAX_WIDTH},
 };
-use softvt_scene::{Asset, Body};
+use softvt_scene::{Asset, Body, Object};
 
-/// Access of an expert to the tactile sensors.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum FingerAccess {
     None,
@@ -50,7 +47,6 @@ type SharedNotes = Arc<Mutex<BTreeMap<String, f64>>>;
 type SharedReadings = Arc<Mutex<Option<FingerReadings>>>;
 type SharedView = Arc<Mutex<ExpertView>>;
 
-/// The line where a function of a script begins.
 fn defined_line(function: &Function) -> Option<SourceLine> {
     let info = function.info();
     let file = info.source?.strip_prefix('@')?.to_owned();
@@ -92,21 +88,21 @@ impl Coroutine {
         lock(&self.notes).clone()
     }
 
-    /// Sets the finger readings of the next control step.
     pub(crate) fn set_readings(&mut self, readings: Option<FingerReadings>) {
         *lock(&self.readings) = readings;
     }
 
-    /// Returns the next command; `None` at the end of the expert, also if it gave up.
+    /// Returns the next command, given a complaint about the last one; `None` at the end, also of one that gave up.
     pub(crate) fn next_command(
         &mut self,
         lua: &Lua,
-        input: ExpertInput,
+        view: &ExpertView,
+        complaint: Option<String>,
         monitor: &mut TrackingErrorMonitor,
     ) -> mlua::Result<Option<ExpertCommand>> {
-        let command = match input.complaint {
-            Some(complaint) => self.refuse(lua, &input.view, &complaint)?,
-            None => self.step(lua, &input.view)?,
+        let command = match complaint {
+            Some(complaint) => self.refuse(lua, view, &complaint)?,
+            None => self.step(lua, view)?,
         };
         if command.is_some() {
             monitor.command = command;
@@ -122,7 +118,10 @@ impl Coroutine {
         let is_first = self.running.is_none();
         let values = self.resume(lua, view)?;
         if is_first && self.waiting().is_none() {
-            self.gave_up = Some(self.no_command_message());
+            let place = defined_at(&self.function);
+            self.gave_up = Some(format!(
+                "{place}: the expert ended without a command; it is called once and returns when the task is done"
+            ));
         }
         self.read_command(lua, view, values)
     }
@@ -161,14 +160,6 @@ impl Coroutine {
         }
     }
 
-    /// The reason of an expert that ended in its first step.
-    fn no_command_message(&self) -> String {
-        let place = defined_at(&self.function);
-        format!(
-            "{place}: the expert ended without a command; it is called once and returns when the task is done"
-        )
-    }
-
     /// The coroutine, if it waits for the next control step.
     fn waiting(&self) -> Option<&Thread> {
         self.running.as_ref().map(|(thread, _)| thread).filter(|thread| thread.is_resumable())
@@ -176,9 +167,6 @@ impl Coroutine {
 
     /// Raises `complaint` where the script waits, and returns the next command of a script that catches it. Any other
     /// script has given up, with `complaint` and its line as the reason.
-    ///
-    /// # Errors
-    /// The script catches the complaint and fails for another reason.
     fn refuse(
         &mut self,
         lua: &Lua,
@@ -211,17 +199,20 @@ impl Coroutine {
     }
 
     fn resume(&mut self, lua: &Lua, view: &ExpertView) -> mlua::Result<MultiValue> {
-        if let Some((thread, shared)) = &self.running {
-            *lock(shared) = view.clone();
-            let resumed = if thread.is_resumable() { thread.resume(()) } else { Ok(MultiValue::new()) };
-            return resumed.map_err(|error| placed(error, defined_line(&self.function)));
-        }
-        let view = Arc::new(Mutex::new(view.clone()));
-        let host = lua.create_userdata(MeasuredArm(view.clone()))?;
-        let arm = arm(lua, &host, finger_access(lua, self.access, &self.readings)?, &self.notes)?;
-        let thread = lua.create_thread(self.function.clone())?;
-        let (thread, view) = self.running.insert((thread, view));
-        let resumed = thread.resume((arm, SceneState(view.clone())));
+        let resumed = match &self.running {
+            Some((thread, shared)) => {
+                *lock(shared) = view.clone();
+                if thread.is_resumable() { thread.resume(()) } else { Ok(MultiValue::new()) }
+            }
+            None => {
+                let view = Arc::new(Mutex::new(view.clone()));
+                let host = lua.create_userdata(MeasuredArm(view.clone()))?;
+                let arm = arm(lua, &host, finger_access(lua, self.access, &self.readings)?, &self.notes)?;
+                let thread = lua.create_thread(self.function.clone())?;
+                let (thread, view) = self.running.insert((thread, view));
+                thread.resume((arm, SceneState(view.clone())))
+            }
+        };
         resumed.map_err(|error| placed(error, defined_line(&self.function)))
     }
 }
@@ -234,7 +225,7 @@ fn arm(lua: &Lua, host: &mlua::AnyUserData, fingers: Table, notes: &SharedNotes)
         let mut notes = lock(&notes);
         notes.insert(name, value);
         if notes.len() > MAX_NOTES {
-            return Err(fail(lua, format!("arm:note: expected at most {MAX_NOTES} names; note fewer")));
+            bail!(lua, "arm:note: expected at most {MAX_NOTES} names; note fewer");
         }
         Ok(())
     })?;
@@ -248,12 +239,11 @@ fn arm(lua: &Lua, host: &mlua::AnyUserData, fingers: Table, notes: &SharedNotes)
 /// A file of the library's own Lua code, out of the reach of scripts.
 fn library_chunk(lua: &Lua, name: &str) -> mlua::Result<mlua::chunk::Chunk<'static>> {
     let text = embedded(&format!("scripts/softvt/{name}.lua"))
-        .ok_or_else(|| fail(lua, format!("the embedded library has no {name}")))?;
+        .ok_or_else(|| fail!(lua, "the embedded library has no {name}"))?;
     let chunk = lua.load(text).set_name(format!("=softvt.{name}")).set_mode(ChunkMode::Text);
     Ok(chunk.set_environment(base_library(lua)?))
 }
 
-/// The tactile sensors for the arm's Lua code.
 fn finger_access(lua: &Lua, access: FingerAccess, readings: &SharedReadings) -> mlua::Result<Table> {
     let table = lua.create_table()?;
     table.set("servo", access == FingerAccess::Servo)?;
@@ -273,7 +263,7 @@ fn checks(lua: &Lua) -> mlua::Result<Table> {
         .find(|signature| signature.name == name)
     {
         Some(signature) => arguments(lua, &format!("arm:{name}"), signature, values),
-        None => Err(fail(lua, format!("arm: the method {name:?} is not declared"))),
+        None => Err(fail!(lua, "arm: the method {name:?} is not declared")),
     };
     let missing_self_error = move |lua: &Lua, (name, first): (String, Value)| -> mlua::Result<()> {
         Err(class.missing_self_error(lua, &name, &first))
@@ -304,9 +294,9 @@ mod options {
     record! {
         /// Options of a motion of the arm.
         MotionOptions: "softvt.MotionOptions" as "arm:move_to" {
-            /// Largest speed.
+            /// Largest speed of the tool.
             speed: f64 = Type::Number("m/s", Range::above(0.0, MAX_SPEED)) => Number(0.25);
-            /// Largest angular speed.
+            /// Largest angular speed of the tool.
             angular_speed: f64 = Type::Number("rad/s", Range::above(0.0, MAX_ANGULAR_SPEED)) => Number(1.5);
             /// Closure at the end; by default it stays.
             closure: Option<f64> = CLOSURE;
@@ -357,7 +347,7 @@ class! {
         fields {
             /// Measured pose of the tool centre point.
             pose: "softvt.Pose" { get(_, this) { this.tool_pose() } }
-            /// Last commanded pose.
+            /// Pose of the last command.
             target: "softvt.Pose" { get(_, this) { this.tool_pose() } }
             /// Last commanded closure: 0 is open, 1 is closed.
             closure: "number" { get(_, this) { this.read(|view| view.closure) } }
@@ -407,7 +397,7 @@ class! {
             fn grasp(closure: f64 = CLOSURE, options: GraspOptions) -> [];
             /// Releases an object by opening, by default wide.
             fn release(options: ReleaseOptions) -> [];
-            /// Opens the gripper.
+            /// Opens the gripper to its full stroke.
             fn open(options: RateOptions) -> [];
             /// Returns the present readings of the tactile sensors; the first call waits for a control step. Available
             /// in simulation:drive and under --policy tactile-servo.
@@ -427,11 +417,9 @@ class! {
     }
 }
 
-/// `softvt.Instances`.
 #[derive(Clone)]
 pub(crate) struct LuaInstances {
     instances: Arc<SuiteInstances>,
-    /// The scene of an episode.
     view: Option<SharedView>,
     /// Assets of the goals of the suite, once they are known.
     kinds: Arc<Mutex<Option<Vec<Arc<Asset>>>>>,
@@ -457,7 +445,7 @@ impl LuaInstances {
         if let Some(view) = &self.view {
             let view = lock(view);
             if let Some(object) = view.objects.iter().find(|object| object.name == name) {
-                return Ok(object.nominal.clone());
+                return Ok(object.placed.as_ref().map(|placed| placed.nominal.clone()));
             }
         }
         let kinds = self.kinds()?;
@@ -499,7 +487,7 @@ functions! {
         /// Returns the instances that a suite can draw, by its own variation.
         fn instances(lua, suite: Constructed<SuiteSpec>) -> ["softvt.Instances"] {
             check_privilege(lua, "softvt.instances")?;
-            let ranges = suite.vary.as_ref().map(|vary| vary.ranges());
+            let ranges = suite.vary.as_deref().cloned();
             LuaInstances::new(Arc::new(SuiteInstances::new(lua, &suite, ranges)?), None)
         }
     }
@@ -508,7 +496,6 @@ functions! {
 /// Distances beyond this are reported as this, m.
 const MAX_CLEARANCE: f64 = 0.2;
 
-/// `softvt.SceneState`.
 #[derive(Clone)]
 pub(crate) struct SceneState(SharedView);
 
@@ -532,8 +519,7 @@ class! {
                 let view = lock(&this.0);
                 let whole = find(lua, "scene", "object", &view.objects, &object)?;
                 if whole.parts.is_empty() {
-                    let message = format!("scene: {object} has no parts, which softvt.articulated has");
-                    return Err(fail_at(lua, author_line(lua), message));
+                    return Err(fail_at(lua, author_line(lua), format_args!("scene: {object} has no parts, which softvt.articulated has")));
                 }
                 object_state(lua, find(lua, "scene", "part", &whole.parts, &part)?)?
             }
@@ -587,7 +573,7 @@ fn find<'a>(
     let names = all.iter().map(|object| object.name.as_str());
     all.iter().find(|object| object.name == name).ok_or_else(|| {
         // Of the script's author, also where an expert of the library looks for it.
-        fail_at(lua, author_line(lua), format!("{label}: {}", unknown_name(what, name, names)))
+        fail_at(lua, author_line(lua), format_args!("{label}: {}", unknown_name(what, name, names)))
     })
 }
 
@@ -604,15 +590,15 @@ output! {
         /// while it settled, of the upright box about it as it lay then, longer horizontal side first.
         size: "number[]" = lua.create_sequence_from(object.size.iter().copied())?;
         /// Size relative to that of its asset. `size` and hints in metres are those of the object itself.
-        scale: "number" = object.scale;
+        scale: "number" = object.placed.as_ref().map_or(1.0, |placed| placed.scale);
         /// Young's modulus relative to that of its asset; nil unless soft.
-        youngs_factor: "number?" = object.youngs_factor;
+        youngs_factor: "number?" = object.placed.as_ref().and_then(Object::youngs_factor);
         /// Density relative to that of its asset; nil unless soft or rigid.
-        density_factor: "number?" = object.density_factor;
+        density_factor: "number?" = object.placed.as_ref().and_then(Object::density_factor);
         /// Stable strain relative to that of its asset; nil unless soft.
-        strain_factor: "number?" = object.strain_factor;
+        strain_factor: "number?" = object.placed.as_ref().and_then(Object::strain_factor);
         /// Static friction of its coating, which is that of every pair with it; nil without one.
-        coating: "number?" = object.coating;
+        coating: "number?" = object.placed.as_ref().and_then(Object::coating);
         /// Rotation of its bounding box about the vertical, rad.
         yaw: "number" = object.yaw;
         /// Numbers of its asset for experts; those whose names end in _m are lengths and follow the scale.

@@ -25,25 +25,13 @@ use softvt_robot::{
 use softvt_rollout::{ObjectInstance, Simulation};
 use softvt_scene::{Asset, Object};
 
-/// True state of an object.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct ObjectView {
-    /// Name in the scene.
     pub name: String,
     /// Shape, material and hints of this instance.
     pub asset: Arc<Asset>,
-    /// The asset as its file defines it; `None` for a part.
-    pub nominal: Option<Arc<Asset>>,
-    /// Size relative to that of the asset.
-    pub scale: f64,
-    /// Young's modulus relative to that of the asset; `None` unless soft.
-    pub youngs_factor: Option<f64>,
-    /// Density relative to that of the asset; `None` unless soft or rigid.
-    pub density_factor: Option<f64>,
-    /// Stable strain relative to that of the asset; `None` unless soft.
-    pub strain_factor: Option<f64>,
-    /// Static friction of its coating; `None` without one.
-    pub coating: Option<f64>,
+    /// The object as it was placed; `None` for a part.
+    pub placed: Option<Object>,
     /// Object frame in the world.
     pub pose_w: Pose,
     /// Bounds of its shape at rest, object frame.
@@ -54,17 +42,14 @@ pub(crate) struct ObjectView {
     pub centre_w: Vec3,
     /// Rotation of that box about the vertical, rad.
     pub yaw: f64,
-    /// Joint of a part.
     pub joint: Option<JointView>,
     pub parts: Vec<ObjectView>,
 }
 
-/// True state of the joint of a part.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct JointView {
     /// Value, m or rad.
     pub value: f64,
-    /// Lowest and highest value.
     pub range: [f64; 2],
     /// Direction in which the value of a slider grows, axis about which that of a hinge does; world frame.
     pub axis_w: Vec3,
@@ -72,10 +57,8 @@ pub(crate) struct JointView {
     pub origin_w: Vec3,
 }
 
-/// True state of the scene at a control step.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct ExpertView {
-    /// Time since the start, s.
     pub time_s: f64,
     /// Length of a control step, s.
     pub dt_s: f64,
@@ -104,29 +87,22 @@ pub(crate) struct ExpertView {
 /// The instances of a suite: what a controller may know that must not know the instance.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct SuiteInstances {
-    /// Name of the suite.
     pub suite: String,
     /// Its variation; without one every object is its asset.
     pub ranges: Option<VariationRanges>,
-    /// Objects of the goals of its tasks.
     pub goals: Vec<GoalObject>,
 }
 
-/// The object of a task's goal.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct GoalObject {
     /// Name of the layout that places it, and its function.
     pub layout: String,
     pub build: mlua::Function,
-    /// Scene name.
     pub name: String,
 }
 
 impl SuiteInstances {
     /// The instances of a suite with these ranges, which may be others than its own.
-    ///
-    /// # Errors
-    /// A task names no object.
     pub(crate) fn new(lua: &Lua, suite: &SuiteSpec, ranges: Option<VariationRanges>) -> mlua::Result<Self> {
         let goal = |task: &Constructed<TaskSpec>| {
             let (layout, build) = (task.layout.name.clone(), task.layout.build.clone());
@@ -137,9 +113,6 @@ impl SuiteInstances {
     }
 
     /// The assets of the objects of all goals, each once, as their files define them.
-    ///
-    /// # Errors
-    /// A layout fails.
     pub(crate) fn kinds(&self) -> mlua::Result<Vec<Arc<Asset>>> {
         let id = EpisodeId {
             suite: self.suite.clone(),
@@ -163,7 +136,6 @@ impl SuiteInstances {
     }
 }
 
-/// Command of an expert for one control step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct ExpertCommand {
     /// Tool centre point in the robot base frame.
@@ -176,23 +148,9 @@ pub(crate) struct ExpertCommand {
     pub goal_b: Option<Pose>,
 }
 
-/// Input of an expert at a control step, with a complaint about its last command if the arm cannot reach it.
-pub(crate) struct ExpertInput {
-    pub view: ExpertView,
-    pub complaint: Option<String>,
-}
-
-impl ExpertInput {
-    /// Copies the true state of a simulation.
-    pub(crate) fn new(sim: &Simulation, time_s: f64, monitor: &mut TrackingErrorMonitor) -> Self {
-        Self { view: expert_view(sim, time_s), complaint: monitor.complaint(sim) }
-    }
-}
-
 /// The poses that the arm reaches from its present joint positions.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct ArmReach {
-    /// Parameters of inverse kinematics.
     pub ik: IkSpec,
     /// Joint positions, rad.
     pub joints: ArmAngles,
@@ -204,7 +162,7 @@ impl ArmReach {
     /// Control steps in which the arm may get there: 20 s.
     const STEPS: usize = 400;
 
-    /// What remains to a tool pose, base frame, where the arm gets no nearer to it. `None` if it gets there.
+    /// Remaining difference to a tool pose, base frame, where the arm stops; `None` if it gets there.
     pub(crate) fn miss(&self, pose_b: &Pose) -> Option<PoseDifference> {
         let mut ik = DiffIk::new(&self.ik, self.joints, CONTROL_DT);
         let mut joints = self.joints;
@@ -261,12 +219,7 @@ fn object_view(sim: &Simulation, object: &ObjectInstance, name: &str) -> ObjectV
     ObjectView {
         name: name.to_owned(),
         asset: object.asset.clone(),
-        scale: placed.map_or(1.0, |placed| placed.scale),
-        youngs_factor: placed.and_then(Object::youngs_factor),
-        density_factor: placed.and_then(Object::density_factor),
-        strain_factor: placed.and_then(Object::strain_factor),
-        coating: placed.and_then(Object::coating),
-        nominal: placed.map(|placed| placed.nominal.clone()),
+        placed: placed.cloned(),
         pose_w: pose,
         bounds,
         size: own.size(),
@@ -304,7 +257,6 @@ const OTHER_UNIT: f64 = 5.0;
 /// Detects commands that the arm cannot reach. A policy may command anything; in a script it is a mistake.
 #[derive(Debug, Default)]
 pub(crate) struct TrackingErrorMonitor {
-    /// Last command.
     pub command: Option<ExpertCommand>,
     /// Control steps for which the tool has been away from its commands.
     steps: u32,
@@ -312,7 +264,7 @@ pub(crate) struct TrackingErrorMonitor {
 
 impl TrackingErrorMonitor {
     /// A complaint for the script once the tool has been away for a second from a pose that it cannot reach.
-    fn complaint(&mut self, sim: &Simulation) -> Option<String> {
+    pub(crate) fn complaint(&mut self, sim: &Simulation) -> Option<String> {
         let ExpertCommand { pose_b: command_b, goal_b, .. } = self.command?;
         let unreachable = |pose_b: &Pose| {
             let miss = sim.robot.solve_ik(&sim.world, pose_b).err()?;
@@ -341,7 +293,7 @@ impl TrackingErrorMonitor {
                 Some(goal_miss) => unreachable_message(&goal_miss, base_w),
                 None => format!(
                     "the straight line to {} leads through an {}",
-                    position(&goal_b, base_w),
+                    position(&goal_b.translation.vector, base_w),
                     unreachable_message(&miss, base_w)
                 ),
             },
@@ -349,27 +301,20 @@ impl TrackingErrorMonitor {
     }
 }
 
-/// Position of a pose of the base frame in the world frame, as scripts give it.
-fn position(pose_b: &Pose, base_w: &Pose) -> String {
-    let at = base_w.transform_point(&pose_b.translation.vector.into());
+/// A point of the base frame in the world frame, as scripts give it.
+fn position(point_b: &Vec3, base_w: &Pose) -> String {
+    let at = base_w.transform_point(&(*point_b).into());
     format!("({:.3}, {:.3}, {:.3}) m", at.x, at.y, at.z)
 }
 
-/// Positions are in the world frame, as in scripts.
 fn unreachable_message(miss: &UnreachablePose, base_w: &Pose) -> String {
-    let target = base_w.transform_point(&miss.target_b.into());
-    let base = base_w.translation.vector;
     let unit = if miss.target_b.norm() > OTHER_UNIT { "; positions are in metres" } else { "" };
     format!(
-        "unreachable pose: the tool gets no nearer to ({:.3}, {:.3}, {:.3}) m than {:.0} mm and {:.0}°; bring it nearer to \
-         the robot's base at ({:.3}, {:.3}, {:.3}) m or turn it towards straight down{unit}",
-        target.x,
-        target.y,
-        target.z,
+        "unreachable pose: the tool gets no nearer to {} than {:.0} mm and {:.0}°; bring it nearer to the robot's base at {} \
+         or turn it towards straight down{unit}",
+        position(&miss.target_b, base_w),
         miss.distance * 1e3,
         miss.angle.to_degrees(),
-        base.x,
-        base.y,
-        base.z
+        position(&Vec3::zeros(), base_w)
     )
 }

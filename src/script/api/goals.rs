@@ -3,12 +3,9 @@
 use mlua::{Function, Lua, Table, Value};
 
 use super::pose::ANGLES;
-use crate::{
-    schema::{
-        FromChecked, HasTable, LuaType, Range, Record, RecordType, Type, Unchecked, choice, functions,
-        invalid, make, one_of, record,
-    },
-    vm::error::fail,
+use crate::schema::{
+    HasTable, LuaType, Range, Record, RecordType, Type, Unchecked, choice, functions, invalid, make, one_of,
+    record,
 };
 use softvt_benchmark::{
     Placement,
@@ -28,14 +25,13 @@ const HOLD: Type = Type::Number("s", Range::closed(0.0, 10.0));
 const SHARE: Type = Type::Number("", Range::closed(0.0, 1.0));
 /// Largest distance of two objects in a goal, m: about that of the ends of the workspace.
 const MAX_DISTANCE: f64 = 1.5;
-/// Distance beyond which an object is beside another.
+/// Smallest distance of an object on a side of another.
 const BEYOND: Type = Type::Number("m", Range::closed(0.0, MAX_DISTANCE));
 /// Distance within which an object is near another. No two centres are nearer than a millimetre for long.
 const WITHIN: Type = Type::Number("m", Range::closed(1e-3, MAX_DISTANCE));
 /// Type of the parts of a combination. It names no constructors, since those of combinations would name themselves; the
 /// functions that make combinations check their arguments.
 const GOALS: Type = Type::List(&Type::Table("softvt.Goal"));
-/// Type of the arguments of these functions.
 const PARTS: Type = Type::List(<GoalSpec as LuaType>::REFERENCE);
 
 record! {
@@ -93,7 +89,7 @@ record! {
         object: String;
         /// Scene name of the target, or of a part of it.
         target: String;
-        /// Largest distance.
+        /// Largest distance of the centres.
         distance: f64 = WITHIN => Number(0.15);
         /// Time that it must stay there.
         hold_s: f64 = HOLD => Number(0.4);
@@ -125,24 +121,24 @@ record! {
     /// A function of the true scene returns true at the end of a control step. It must depend on its argument alone:
     /// variables that it changes are not part of the state of an episode.
     PredicateSpec: "softvt.Predicate" as "task.goal", constructor "softvt.predicate" {
-        /// What holds, in words, as records and reports show it.
+        /// Condition in words, for records and reports.
         name: String;
-        /// The function.
+        /// Returns true if the condition holds.
         holds: Function = Type::Function("fun(scene: softvt.SceneState): boolean");
     }
     /// All of these goals hold at once.
     AllSpec: "softvt.All" as "task.goal", constructor "softvt.all" {
-        /// The goals.
+        /// Goals that must hold.
         goals: Vec<Table> = GOALS;
     }
     /// At least one of these goals holds.
     AnySpec: "softvt.Any" as "task.goal", constructor "softvt.any" {
-        /// The goals.
+        /// Goals of which one must hold.
         goals: Vec<Table> = GOALS;
     }
     /// None of these goals holds.
     NoneSpec: "softvt.None" as "task.goal", constructor "softvt.none" {
-        /// The goals.
+        /// Goals that must not hold.
         goals: Vec<Table> = GOALS;
     }
     /// Each of these goals has held once after the one before it had, and the last one holds.
@@ -172,19 +168,8 @@ one_of! {
     }
 }
 
-/// Constructors of goals that are tables with named fields.
-pub(crate) static CONSTRUCTORS: &[&Record] = &[
-    OnSpec::RECORD,
-    InsideSpec::RECORD,
-    StackedSpec::RECORD,
-    OpenedSpec::RECORD,
-    ClosedSpec::RECORD,
-    TurnedSpec::RECORD,
-    NearSpec::RECORD,
-    BesideSpec::RECORD,
-    UprightSpec::RECORD,
-    PredicateSpec::RECORD,
-];
+/// Constructors of goals that are tables with named fields: all but the combinations, which come last.
+pub(crate) static CONSTRUCTORS: &[&Record] = GoalSpec::RECORDS.split_at(GoalSpec::RECORDS.len() - 4).0;
 
 functions! {
     FUNCTIONS {
@@ -212,11 +197,10 @@ functions! {
 /// Type of the argument of `left_of` and of the like.
 const BESIDE: Type = Type::Table("{ object: string, target: string, distance: number?, hold_s: number? }");
 
-/// The goal `softvt.beside` of a side, from the other fields.
+/// Makes the goal of a side from the other fields.
 fn beside(lua: &Lua, side: &str, of: &Value) -> mlua::Result<Table> {
     let Value::Table(of) = of else {
-        let message = format!("{side}: expected a table; write softvt.{side} {{ object = …, target = … }}");
-        return Err(fail(lua, message));
+        bail!(lua, "{side}: expected a table; write softvt.{side} {{ object = …, target = … }}");
     };
     if !of.raw_get::<Value>("side")?.is_nil() {
         let message = format!("softvt.{side} is this side already; leave side out, or write softvt.beside");
@@ -231,15 +215,12 @@ fn beside(lua: &Lua, side: &str, of: &Value) -> mlua::Result<Table> {
     make(lua, BesideSpec::RECORD, &Value::Table(table))
 }
 
-/// Largest depth of goals within goals.
 const MAX_DEPTH: usize = 8;
-/// Largest number of predicates of a goal.
 const MAX_PREDICATES: usize = 64;
 
-/// Makes a combination of goals.
 fn combine(lua: &Lua, record: &'static Record, name: &str, goals: &Table) -> mlua::Result<Table> {
     if goals.raw_len() == 0 {
-        return Err(fail(lua, format!("{name}: expected at least one goal; write softvt.{name} {{ a, b }}")));
+        bail!(lua, "{name}: expected at least one goal; write softvt.{name} {{ a, b }}");
     }
     let table = lua.create_table()?;
     table.set("goals", goals)?;
@@ -248,9 +229,7 @@ fn combine(lua: &Lua, record: &'static Record, name: &str, goals: &Table) -> mlu
 
 /// A predicate with the place in which a script declares it.
 pub(crate) struct DeclaredPredicate {
-    /// As plain data.
     pub goal: Goal,
-    /// Its table, for messages.
     pub table: Table,
     /// Its function, if it is [`Goal::Predicate`].
     pub function: Option<Function>,
@@ -267,16 +246,11 @@ impl DeclaredPredicate {
 
 impl GoalSpec {
     /// The goal as plain data, and its predicates in order.
-    ///
-    /// # Errors
-    /// A goal that is changed after it was made, or is too deep or too large.
     pub(crate) fn plain(&self, lua: &Lua) -> mlua::Result<(Goal, Vec<DeclaredPredicate>)> {
         let mut predicates = Vec::new();
         let goal = self.convert(lua, 0, &mut predicates)?;
         if predicates.len() > MAX_PREDICATES {
-            let message =
-                format!("task.goal: has {} predicates; give at most {MAX_PREDICATES}", predicates.len());
-            return Err(fail(lua, message));
+            bail!(lua, "task.goal: has {} predicates; give at most {MAX_PREDICATES}", predicates.len());
         }
         Ok((goal, predicates))
     }
@@ -288,41 +262,33 @@ impl GoalSpec {
         predicates: &mut Vec<DeclaredPredicate>,
     ) -> mlua::Result<Goal> {
         if depth > MAX_DEPTH {
-            return Err(fail(lua, format!("task.goal: goals are nested more than {MAX_DEPTH} deep")));
+            bail!(lua, "task.goal: goals are nested more than {MAX_DEPTH} deep");
         }
-        let mut parts = |goals: &[Table]| -> mlua::Result<SubGoals> {
-            let goal = |goal: &Table| {
-                Self::from_checked(Value::Table(goal.clone()), lua)?.convert(lua, depth + 1, predicates)
-            };
-            Ok(SubGoals { goals: goals.iter().map(goal).collect::<mlua::Result<_>>()? })
+        let (goals, combined): (&[Table], fn(SubGoals) -> Goal) = match self {
+            Self::All(spec) => (&spec.goals, Goal::All),
+            Self::Any(spec) => (&spec.goals, Goal::Any),
+            Self::None(spec) => (&spec.goals, Goal::None),
+            Self::Sequence(spec) => (&spec.goals, Goal::Sequence),
+            predicate => return Ok(predicate.declare(predicates)),
         };
-        match self {
-            Self::All(spec) => return parts(&spec.goals).map(Goal::All),
-            Self::Any(spec) => return parts(&spec.goals).map(Goal::Any),
-            Self::None(spec) => return parts(&spec.goals).map(Goal::None),
-            Self::Sequence(spec) => return parts(&spec.goals).map(Goal::Sequence),
-            _ => {}
-        }
-        let (table, function) = (self.table().clone(), self.function());
-        let mut declare = |goal: Goal| {
+        let goal = |goal: &Table| {
+            Self::from_checked(Value::Table(goal.clone()), lua)?.convert(lua, depth + 1, predicates)
+        };
+        Ok(combined(SubGoals { goals: goals.iter().map(goal).collect::<mlua::Result<_>>()? }))
+    }
+
+    /// A predicate as plain data; an empty conjunction for a combination.
+    fn declare(&self, predicates: &mut Vec<DeclaredPredicate>) -> Goal {
+        let mut declared = |goal: Goal| {
             predicates.push(DeclaredPredicate {
                 goal: goal.clone(),
-                table: table.clone(),
-                function: function.clone(),
+                table: self.table().clone(),
+                function: if let Self::Predicate(goal) = self { Some(goal.holds.clone()) } else { None },
                 is_stacked: matches!(self, Self::Stacked(_)),
             });
             goal
         };
-        if let Self::Stacked(spec) = self {
-            let on = |pair: &[String]| declare(Goal::On(placement(&pair[1], &pair[0], spec.hold_s)));
-            return Ok(Goal::All(SubGoals { goals: spec.objects.windows(2).map(on).collect() }));
-        }
-        Ok(declare(self.predicate()))
-    }
-
-    /// A predicate as plain data; an empty conjunction for a combination.
-    fn predicate(&self) -> Goal {
-        match self {
+        let goal = match self {
             Self::On(goal) => Goal::On(placement(&goal.object, &goal.target, goal.hold_s)),
             Self::Inside(goal) => Goal::Inside(placement(&goal.object, &goal.target, goal.hold_s)),
             Self::Opened(goal) => Goal::Opened { joint: goal.joint.clone(), share: goal.share },
@@ -341,17 +307,15 @@ impl GoalSpec {
                 Goal::Upright { object: goal.object.clone(), hold_s: goal.hold_s, angle_rad: goal.angle }
             }
             Self::Predicate(goal) => Goal::Predicate { name: goal.name.clone() },
-            Self::Stacked(_) | Self::All(_) | Self::Any(_) | Self::None(_) | Self::Sequence(_) => {
-                Goal::All(SubGoals { goals: Vec::new() })
+            Self::Stacked(spec) => {
+                let on = |pair: &[String]| declared(Goal::On(placement(&pair[1], &pair[0], spec.hold_s)));
+                return Goal::All(SubGoals { goals: spec.objects.windows(2).map(on).collect() });
             }
-        }
-    }
-
-    fn function(&self) -> Option<Function> {
-        match self {
-            Self::Predicate(goal) => Some(goal.holds.clone()),
-            _ => None,
-        }
+            Self::All(_) | Self::Any(_) | Self::None(_) | Self::Sequence(_) => {
+                return Goal::All(SubGoals { goals: Vec::new() });
+            }
+        };
+        declared(goal)
     }
 }
 

@@ -7,17 +7,12 @@ use mlua::{Lua, LuaString, Value};
 
 use crate::{
     schema::{Range, Type, class, functions},
-    vm::{
-        error::fail,
-        memory_budget::{Reservation, reserve},
-    },
+    vm::memory_budget::{Reservation, reserve},
 };
 use softvt_common::{parallel::lock, text::format_number};
 use softvt_media::canvas::Canvas;
 use softvt_sensing::camera::resize;
 
-/// Longest text that is written on an image, bytes.
-const MAX_TEXT_BYTES: usize = 1000;
 /// Largest edge of an image that a script may make, pixels.
 const MAX_EDGE: f64 = 8192.0;
 const EDGE: Type = Type::Integer(Range::closed(1.0, MAX_EDGE));
@@ -27,7 +22,6 @@ const REGION: Type = Type::vector(4, "x, y, width, height in pixels");
 const OFFSET: Range = Range::closed(-1e5, 1e5);
 const SRGB: Type = Type::vector(3, "sRGB of 0 to 255");
 
-/// `softvt.Image`.
 #[derive(Clone, Debug)]
 pub(crate) struct LuaImage(Arc<Mutex<ImageContent>>);
 
@@ -38,7 +32,6 @@ struct ImageContent {
 }
 
 impl LuaImage {
-    /// Takes an image into the virtual machine.
     pub(crate) fn new(lua: &Lua, image: RgbImage) -> mlua::Result<Self> {
         let reserved = reserve(lua, image.as_raw().len())?;
         Ok(Self(Arc::new(Mutex::new(ImageContent { image, _reserved: reserved }))))
@@ -56,7 +49,6 @@ pub(crate) fn image_of(value: &Value) -> Option<RgbImage> {
     value.as_userdata()?.borrow::<LuaImage>().ok().map(|image| lock(&image.0).image.clone())
 }
 
-/// A colour from numbers of 0 to 255.
 fn srgb(colour: [f64; 3]) -> [u8; 3] {
     colour.map(|c| c.clamp(0.0, 255.0).round() as u8)
 }
@@ -81,7 +73,7 @@ fn part(lua: &Lua, method: &str, image: &RgbImage, region: Option<[f64; 4]>) -> 
     }
     let got = region.map(format_number).join(", ");
     let message = format!("expected x, y, width, height within {width} × {height} pixels, got {{{got}}}");
-    Err(fail(lua, format!("image:{method}: region: {message}")))
+    Err(fail!(lua, "image:{method}: region: {message}"))
 }
 
 functions! {
@@ -92,7 +84,7 @@ functions! {
             width: u32 = EDGE;
             /// Height, pixels.
             height: u32 = EDGE;
-            /// Colour.
+            /// Colour of every pixel.
             colour: [f64; 3] = SRGB;
         } -> ["softvt.Image"] {
             LuaImage::new(lua, RgbImage::from_pixel(width, height, Rgb(srgb(colour))))?
@@ -135,7 +127,7 @@ class! {
                 let Some(pixel) = image.get_pixel_checked(x, y) else {
                     let (width, height) = image.dimensions();
                     let message = format!("expected a pixel of {width} × {height}, got {x}, {y}; the first is 0, 0");
-                    return Err(fail(lua, format!("image:pixel: {message}")));
+                    bail!(lua, "image:pixel: {message}");
                 };
                 lua.create_sequence_from(pixel.0)?
             }
@@ -152,23 +144,17 @@ class! {
             /// Copies another image onto this one, with its top left pixel at x, y.
             fn paste(_, this, other: LuaImage, x: f64 = Type::Number("pixels", OFFSET), y: f64 = Type::Number("pixels", OFFSET)) -> [] { this.paste(&other, x, y) }
             /// Writes a line of text on the image.
-            fn text(lua, this, text: LuaString = Type::Line) takes style "softvt.Text" {
+            fn text(_, this, text: LuaString = Type::Line) takes style "softvt.Text" {
                 /// Left end of its baseline, from the top left.
                 at: [f64; 2] = Type::Vector(2, "pixels", OFFSET);
                 /// Height of the letters.
                 size: f32 = Type::Number("pixels", Range::closed(4.0, 200.0)) => Number(18.0);
-                /// Colour.
+                /// Colour of the letters.
                 colour: [f64; 3] = SRGB;
             } -> [] {
-                let text = text.to_string_lossy();
-                if text.len() > MAX_TEXT_BYTES {
-                    let length = text.len();
-                    let message = format!("image:text: text: expected at most {MAX_TEXT_BYTES} bytes, got {length}");
-                    return Err(fail(lua, message));
-                }
                 let image = &mut lock(&this.0).image;
                 let mut canvas = Canvas::from_image(image);
-                canvas.write(&text, at[0] as f32, at[1] as f32, size, srgb(colour));
+                canvas.write(&text.to_string_lossy(), at[0] as f32, at[1] as f32, size, srgb(colour));
                 *image = canvas.to_image();
             }
         }

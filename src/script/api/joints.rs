@@ -6,17 +6,14 @@ use mlua::{Lua, Table};
 
 use super::{assets::DENSITY, pose::ANGLES, shapes::LuaShape, visuals::visuals_of};
 use crate::{
-    schema::{
-        FromChecked, LuaType, Range, Record, RecordType, Type, ValidationError, error_at_key, one_of, record,
-    },
+    schema::{LuaType, Range, Record, RecordType, Type, ValidationError, error_at_key, one_of, record},
     vm::error::fail,
 };
-use softvt_common::text::{format_number, unknown_name};
+use softvt_common::text::unknown_name;
 use softvt_geometry::{Pose, Vec3};
 use softvt_physics::contact::Friction;
 use softvt_scene::{Asset, Body, Joint, JointMotion, MovingPart, Visual, part_poses};
 
-/// Value of a slider.
 const TRAVEL: Type = Type::Number("m", Range::ANY.usually(-2.0, 2.0));
 
 record! {
@@ -24,13 +21,13 @@ record! {
     SliderSpec: "softvt.Slider" as "slider", constructor "softvt.slider", relation Increasing(&["lower", "upper"]) {
         /// Direction in which its value grows.
         axis: [f64; 3] = Type::Direction(&[], "object frame");
-        /// Lowest value.
+        /// Lowest value of the joint.
         lower: f64 = TRAVEL;
         /// Highest value, above the lowest.
         upper: f64 = TRAVEL;
-        /// Viscous damping.
+        /// Viscous damping of the joint.
         damping: f64 = Type::Number("N s/m", Range::NOT_NEGATIVE.usually(0.0, 1000.0)) => Number(0.0);
-        /// Dry friction.
+        /// Dry friction of the joint.
         friction: f64 = Type::Number("N", Range::NOT_NEGATIVE.usually(0.0, 100.0)) => Number(0.0);
     }
     /// A joint about which a part turns, such as that of a door or a knob. Values are in rad.
@@ -39,13 +36,13 @@ record! {
         axis: [f64; 3] = Type::Direction(&[], "object frame");
         /// A point of the axis, with all joints at 0.
         origin: [f64; 3] = Type::Vector(3, "m, object frame", Range::ANY.usually(-2.0, 2.0));
-        /// Lowest value.
+        /// Lowest value of the joint.
         lower: f64 = Type::Number("rad", ANGLES);
         /// Highest value, above the lowest.
         upper: f64 = Type::Number("rad", ANGLES);
-        /// Viscous damping.
+        /// Viscous damping of the joint.
         damping: f64 = Type::Number("N m s/rad", Range::NOT_NEGATIVE.usually(0.0, 30.0)) => Number(0.0);
-        /// Dry friction.
+        /// Dry friction of the joint.
         friction: f64 = Type::Number("N m", Range::NOT_NEGATIVE.usually(0.0, 20.0)) => Number(0.0);
     }
     /// A part of an articulated object. Parts of one object never touch each other or its base.
@@ -54,7 +51,7 @@ record! {
         name: String = Type::Name;
         /// Shape with all joints at 0, in the frame of the whole object. Walls must be at least 4 mm thick.
         shape: LuaShape;
-        /// Density.
+        /// Density of the part.
         density: f64 = DENSITY;
         /// Joint that carries it; axes and origins are in the frame of the whole object.
         joint: JointSpec;
@@ -80,20 +77,19 @@ one_of! {
 pub(crate) static CONSTRUCTORS: &[&Record] =
     &[ArticulatedSpec::RECORD, SliderSpec::RECORD, HingeSpec::RECORD];
 
-fn check_parts(lua: &Lua, record: &Record, body: &Table) -> mlua::Result<()> {
+fn check_parts(lua: &Lua, body: &Table) -> Result<(), ValidationError> {
     let parts = Vec::<PartSpec>::from_checked(body.raw_get("parts")?, lua)?;
-    order(&parts).map(|_| ()).map_err(|error| error_at_key(lua, record.label, &error.inside("parts")))
+    order(&parts).map(drop).map_err(|error| error.inside("parts"))
 }
 
 /// Sorts the parts so that each comes after the one that carries it, and returns their indices.
 fn order(parts: &[PartSpec]) -> Result<Vec<usize>, ValidationError> {
-    let wrong = |message: String| Err(ValidationError::new(message));
     let names: Vec<&str> = parts.iter().map(|part| part.name.as_str()).collect();
     let index_of = |parent: &String| names.iter().position(|name| name == parent);
     for PartSpec { name, parent, .. } in parts {
         if let Some(parent) = parent.as_ref().filter(|parent| index_of(parent).is_none()) {
             let message = unknown_name("part", parent, names.iter().copied());
-            return wrong(format!("part {name:?}: parent: {message}"));
+            return Err(mismatch!("part {name:?}: parent: {message}"));
         }
     }
     let mut sorted: Vec<usize> = Vec::new();
@@ -105,9 +101,7 @@ fn order(parts: &[PartSpec]) -> Result<Vec<usize>, ValidationError> {
         let Some(next) = (0..parts.len()).find(is_ready) else {
             let stuck = (0..parts.len()).filter(|i| !sorted.contains(i)).map(|i| names[i]);
             let stuck = stuck.collect::<Vec<_>>().join(", ");
-            return wrong(format!(
-                "parts {stuck} carry each other in a circle; one must be carried by the base"
-            ));
+            return Err(mismatch!("parts {stuck} carry each other in a circle"));
         };
         sorted.push(next);
     }
@@ -146,25 +140,22 @@ pub(crate) fn parts(
 
 impl JointSpec {
     fn joint(&self) -> Joint {
+        macro_rules! joint {
+            ($spec:ident, $motion:ident, $origin:expr) => {
+                Joint {
+                    motion: JointMotion::$motion,
+                    axis_o: Vec3::from($spec.axis).normalize(),
+                    origin_o: $origin,
+                    lower: $spec.lower,
+                    upper: $spec.upper,
+                    damping: $spec.damping,
+                    friction: $spec.friction,
+                }
+            };
+        }
         match self {
-            Self::Slider(slider) => Joint {
-                motion: JointMotion::Slide,
-                axis_o: Vec3::from(slider.axis).normalize(),
-                origin_o: Vec3::zeros(),
-                lower: slider.lower,
-                upper: slider.upper,
-                damping: slider.damping,
-                friction: slider.friction,
-            },
-            Self::Hinge(hinge) => Joint {
-                motion: JointMotion::Turn,
-                axis_o: Vec3::from(hinge.axis).normalize(),
-                origin_o: Vec3::from(hinge.origin),
-                lower: hinge.lower,
-                upper: hinge.upper,
-                damping: hinge.damping,
-                friction: hinge.friction,
-            },
+            Self::Slider(slider) => joint!(slider, Slide, Vec3::zeros()),
+            Self::Hinge(hinge) => joint!(hinge, Turn, Vec3::from(hinge.origin)),
         }
     }
 }
@@ -178,27 +169,20 @@ pub(crate) fn start_values(
     let parts = asset.parts();
     let mut values: Vec<f64> = parts.iter().map(|part| part.joint.rest()).collect();
     let Some(given) = given else { return Ok(values) };
-    let wrong = |path: &[&str], message: String| {
-        let path = path.iter().map(|key| (*key).to_owned()).collect();
-        error_at_key(lua, "scene:add", &ValidationError { path, message })
-    };
+    let wrong = |error: ValidationError| error_at_key(lua, "scene:add", &error.inside("joints"));
     if parts.is_empty() {
-        return Err(wrong(&["joints"], format!("asset {} has no joints", asset.name)));
+        return Err(wrong(mismatch!("asset {} has no joints", asset.name)));
     }
     for (name, value) in given {
         let Some(index) = parts.iter().position(|part| part.name == *name) else {
             let names = parts.iter().map(|part| part.name.as_str());
-            return Err(wrong(&["joints"], unknown_name("part", name, names)));
+            return Err(wrong(ValidationError::new(unknown_name("part", name, names))));
         };
         let joint = &parts[index].joint;
-        if !(joint.lower..=joint.upper).contains(value) {
-            let (low, high) = (format_number(joint.lower), format_number(joint.upper));
-            let message = format!(
-                "expected a value in {low}..{high} ({}), got {}",
-                joint.unit(),
-                format_number(*value)
-            );
-            return Err(wrong(&["joints", name], message));
+        let range = Range::closed(joint.lower, joint.upper);
+        if !range.contains(*value) {
+            let (expected, got) = (range.expected("a value", joint.unit()), range.show_outside(*value));
+            return Err(wrong(mismatch!("expected {expected}, got {got}").inside(name)));
         }
         values[index] = *value;
     }

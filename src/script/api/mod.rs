@@ -35,7 +35,6 @@ use super::{
         ValidationError, check::error_of_caller, function::signature, functions, make,
     },
     vm::{
-        error::fail,
         list::{LuaList, plain},
         privilege::check_privilege,
         value::{describe, sorted_pairs},
@@ -50,8 +49,7 @@ static LIST: Class = Class {
     doc: "A list that belongs to an object: scene.base, material.albedo, scene.objects. #, [i], ipairs, pairs, table.unpack \
           and table.concat work on it, and it is accepted wherever a list is expected. Numbers of a writable field can be \
           written one by one: scene.base[1] = 0.1 has the effect of scene.base = { 0.1, 0, 0 }. Any other list is read-only.",
-    fields: &[],
-    declared: Vec::new,
+    fields: Vec::new,
     methods: &[],
 };
 
@@ -85,7 +83,7 @@ fn check_fields(
     fields: &BTreeMap<String, String>,
 ) -> Result<Table, ValidationError> {
     let Value::Table(table) = plain(lua, value)? else {
-        return Err(ValidationError::new(format!("expected a table, got {}", describe(value))));
+        return Err(mismatch!("expected a table, got {}", describe(value)));
     };
     for (key, _) in sorted_pairs(&table) {
         if !key.as_string().is_some_and(|key| fields.contains_key(&key.to_string_lossy())) {
@@ -97,14 +95,14 @@ fn check_fields(
         let value: Value = table.raw_get(name.as_str())?;
         let kind = if value.is_integer() { "number" } else { value.type_name() };
         if kind != ty.trim_end_matches('?') && !(value.is_nil() && ty.ends_with('?')) {
-            let message = format!("expected a {}, got {}", ty.trim_end_matches('?'), describe(&value));
-            return Err(ValidationError::new(message).inside(name));
+            return Err(
+                mismatch!("expected a {}, got {}", ty.trim_end_matches('?'), describe(&value)).inside(name)
+            );
         }
     }
     Ok(table)
 }
 
-/// Records of the constructors `softvt.name{…}`.
 pub(crate) fn constructors() -> impl Iterator<Item = &'static Record> {
     [
         tasks::CONSTRUCTORS,
@@ -118,7 +116,6 @@ pub(crate) fn constructors() -> impl Iterator<Item = &'static Record> {
     .copied()
 }
 
-/// Functions `softvt.name(…)`.
 pub(crate) fn functions() -> impl Iterator<Item = &'static Function> {
     [
         FUNCTIONS,
@@ -148,7 +145,7 @@ fn index_of<'a>(
     name: &str,
 ) -> mlua::Result<usize> {
     let index = names.clone().position(|known| known == name);
-    index.ok_or_else(|| fail(lua, format!("{label}: {}", unknown_name(what, name, names))))
+    index.ok_or_else(|| fail!(lua, "{label}: {}", unknown_name(what, name, names)))
 }
 
 /// Records of tables that functions of scripts return.
@@ -161,6 +158,7 @@ pub(crate) static CLASSES: &[&Class] = &[
     world::LuaWorld::CLASS,
     world::LuaBody::CLASS,
     world::LuaSolid::CLASS,
+    world::LuaAttachment::CLASS,
     &world::deformation_table::CLASS,
     simulation::LuaSimulation::CLASS,
     &simulation::measurements::CLASS,
@@ -193,7 +191,6 @@ pub(crate) static CLASSES: &[&Class] = &[
     &observation::forces::CLASS,
 ];
 
-/// Adds everything to the table `softvt`.
 pub(crate) fn install(lua: &Lua, api: &Table) -> mlua::Result<()> {
     for record in constructors() {
         let constructor = lua.create_function(move |lua, value: Value| {
@@ -208,6 +205,7 @@ pub(crate) fn install(lua: &Lua, api: &Table) -> mlua::Result<()> {
     functions().try_for_each(|function| function.install(lua, api, "softvt."))?;
     lua.set_app_data(shapes::UnusedShapes::default());
     lua.set_app_data(UnusualNumbers::default());
+    lua.set_app_data(envelope::CalibratedAssets::default());
     let shapes = lua.create_table()?;
     shapes::SHAPES.iter().try_for_each(|function| function.install(lua, &shapes, "shape."))?;
     api.set("shape", shapes)?;

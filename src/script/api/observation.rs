@@ -5,13 +5,10 @@ use std::sync::Arc;
 use mlua::{Lua, Table, Value};
 
 use super::image::LuaImage;
-use crate::{
-    schema::{
-        FieldValue, Range, Type, class,
-        object::{Access, IntoFieldValue, LuaField, MEASURED, read_only_list},
-        output,
-    },
-    vm::error::fail,
+use crate::schema::{
+    FieldValue, Range, Type, class,
+    object::{Access, IntoFieldValue, LuaField, MEASURED, read_only_list},
+    output,
 };
 use softvt_common::text::unknown_name;
 use softvt_policy::{
@@ -19,11 +16,9 @@ use softvt_policy::{
 };
 use softvt_sensing::tactile::{MarkerFlow, MarkerPositions, Markers};
 
-/// `softvt.Observation`.
 #[derive(Clone)]
 pub(crate) struct LuaObservation {
     observation: Arc<Observation>,
-    /// True if the policy observes the finger drives.
     drives: bool,
 }
 
@@ -38,17 +33,17 @@ impl LuaObservation {
 }
 
 impl LuaObservation {
-    /// Numbers of a stream of the robot, by its index among those with a field.
-    fn robot_stream(&self, lua: &Lua, index: usize) -> mlua::Result<FieldValue> {
-        let Some((stream, field)) = robot_fields().nth(index) else {
-            return Ok(FieldValue::Value(Value::Nil));
+    /// Numbers of a stream of the robot by the name of its field.
+    fn robot_stream(&self, lua: &Lua, name: &str) -> mlua::Result<Option<FieldValue>> {
+        let Some((stream, field)) = robot_fields().find(|(_, field)| *field == name) else {
+            return Ok(None);
         };
         if stream.is_drive && !self.drives {
             return Err(not_observed(lua, field, "drives = true"));
         }
         match &(stream.read)(&self.observation.robot)[..] {
-            [number] => (*number).into_field_value(lua),
-            numbers => Ok(FieldValue::Numbers(numbers.to_vec())),
+            [number] => (*number).into_field_value(lua).map(Some),
+            numbers => Ok(Some(FieldValue::Numbers(numbers.to_vec()))),
         }
     }
 }
@@ -68,9 +63,7 @@ fn robot_field_list() -> Vec<LuaField> {
 
 /// The error for data that was not computed, since the policy does not declare it.
 fn not_observed(lua: &Lua, key: &str, declaration: &str) -> mlua::Error {
-    let message =
-        format!("obs.{key}: the policy does not observe it; declare observes = {{ {declaration} }}");
-    fail(lua, message)
+    fail!(lua, "obs.{key}: the policy does not observe it; declare observes = {{ {declaration} }}")
 }
 
 output! {
@@ -81,16 +74,13 @@ output! {
         /// Force on the right gel.
         right: "number[]" = lua.create_sequence_from(pads[1].wrench.force.iter().copied())?;
     }
-}
-
-output! {
     /// The episode that begins.
     fn task_brief(lua, brief: &EpisodeBrief) -> "softvt.EpisodeBrief" as "task" {
         /// Name of the suite; nil in a judged run.
         suite: "string?" = brief.alias.is_none().then_some(brief.suite.as_str());
         /// Index of the task, from 0; nil in a judged run.
         task: "integer?" = brief.alias.is_none().then_some(brief.task);
-        /// The instruction.
+        /// Instruction of the task.
         prompt: "string" = brief.prompt.as_str();
         /// Index of the episode, from 0; nil in a judged run.
         episode: "integer?" = brief.alias.is_none().then_some(brief.episode);
@@ -115,7 +105,7 @@ class! {
                     if this.drives { robot.gripper_width_m } else { robot.sensed_width_m }
                 }
             }
-            /// The instruction.
+            /// Instruction of the task.
             prompt: "string" { get(_, this) { this.observation.prompt.clone() } }
             /// Tactile sensors; requires observes.tactile.
             tactile: "softvt.Fingers" {
@@ -139,7 +129,7 @@ class! {
                 }
             }
         }
-        declared robot_field_list { get(lua, this, index) { this.robot_stream(lua, index)? } }
+        declared robot_field_list { get(lua, this, name) { this.robot_stream(lua, name)? } }
         methods {
             /// Returns the image of a camera in observes.cameras, 224 × 224 unless the scene defines another size.
             fn camera(lua, this, name: String) -> ["softvt.Image"] {
@@ -149,7 +139,7 @@ class! {
                     None if this.observation.cameras.is_empty() => {
                         return Err(not_observed(lua, "camera", "cameras = { … }"));
                     }
-                    None => return Err(fail(lua, format!("obs:camera: {}", unknown_name("camera", &name, names)))),
+                    None => return Err(fail!(lua, "obs:camera: {}", unknown_name("camera", &name, names))),
                 }
             }
         }
@@ -168,7 +158,6 @@ pub(crate) struct LuaTactileFrame {
     finger: usize,
 }
 
-/// `softvt.Markers`.
 #[derive(Clone)]
 pub(crate) struct LuaMarkers {
     markers: Arc<Markers>,
@@ -176,7 +165,6 @@ pub(crate) struct LuaMarkers {
 }
 
 impl LuaMarkers {
-    /// The markers of one finger.
     pub(crate) fn new(markers: Markers) -> Self {
         Self { flow: Arc::new(MarkerFlow::new(&markers)), markers: Arc::new(markers) }
     }
@@ -185,9 +173,9 @@ impl LuaMarkers {
 output! {
     /// The tactile sensors of both fingers at one control step.
     fn fingers(lua, readings: &FingerReadings) -> "softvt.Fingers" as "tactile" {
-        /// The left finger.
+        /// Frame of the left finger.
         left: "softvt.TactileFrame" = LuaTactileFrame { readings: readings.clone(), finger: 0 };
-        /// The right finger.
+        /// Frame of the right finger.
         right: "softvt.TactileFrame" = LuaTactileFrame { readings: readings.clone(), finger: 1 };
     }
 }
@@ -211,7 +199,6 @@ class! {
     }
 }
 
-/// Marker positions as a list of lists.
 pub(crate) fn positions(lua: &Lua, places: &MarkerPositions) -> mlua::Result<Table> {
     lua.create_sequence_from(places.iter().map(|place| place.map(f64::from).to_vec()))
 }
@@ -224,9 +211,9 @@ class! {
         fields {
             /// Positions on the untouched gel.
             initial: "number[][]" { get(lua, this) { FieldValue::ReadOnly(positions(lua, &this.markers.initial)?, MEASURED) } }
-            /// Present positions.
+            /// Present positions of the markers.
             present: "number[][]" { get(lua, this) { FieldValue::ReadOnly(positions(lua, &this.markers.current)?, MEASURED) } }
-            /// Displacements.
+            /// Displacements of the markers from rest.
             motion: "number[][]" {
                 get(lua, this) { read_only_list(lua, this.flow.displacements.iter().map(|u| vec![u.x, u.y]), MEASURED)? }
             }

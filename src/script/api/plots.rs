@@ -1,9 +1,6 @@
 //! `softvt.plot`: charts of the results of experiments.
 
-use crate::{
-    schema::{functions, record},
-    vm::error::fail,
-};
+use crate::schema::{functions, record};
 use softvt_common::text::shortened;
 use softvt_media::{
     axis::Axis,
@@ -11,7 +8,7 @@ use softvt_media::{
     drawing::{Shape, Stroke, Symbol, Tone},
 };
 
-/// The image, with room for the names of the series.
+/// The image, with space for the names of the series.
 const LAYOUT: Layout =
     Layout { margins: Margins { right: 150.0, ..Layout::SINGLE.margins }, ..Layout::SINGLE };
 /// Letters of the name of a series, and of a title, that fit.
@@ -41,7 +38,7 @@ record! {
     }
     /// Values of a plot that belong together.
     SeriesSpec: "softvt.PlotSeries" as "plot.series" {
-        /// Name beside the last point.
+        /// Name at the last point.
         label: Option<String>;
         /// Points { x, y }, in the order in which a line joins them.
         points: Vec<[f64; 2]>;
@@ -50,9 +47,9 @@ record! {
     }
     /// A horizontal line of a plot.
     LevelSpec: "softvt.PlotLevel" as "plot.levels" {
-        /// Its value.
+        /// Value on the vertical axis.
         y: f64;
-        /// Text on it.
+        /// Text on the line.
         label: Option<String>;
     }
 }
@@ -62,11 +59,11 @@ functions! {
         /// Returns a plot as SVG, for the files of an experiment: `softvt.plot { title = "…", x = { label = "gap" },
         /// y = { label = "D, %" }, series = { { label = "bun", points = { { 40, 0.1 }, { 38, 0.4 } } } } }`.
         fn plot(lua) takes spec "softvt.Plot" {
-            /// Title.
+            /// Title above the plot.
             title: String;
-            /// Horizontal axis.
+            /// The horizontal axis, linear or logarithmic.
             x: AxisSpec;
-            /// Vertical axis.
+            /// The vertical axis, linear or logarithmic.
             y: AxisSpec;
             /// The series, at most six.
             series: Vec<SeriesSpec>;
@@ -74,15 +71,10 @@ functions! {
             levels: Vec<LevelSpec> => Empty;
         } -> ["string"] {
             if series.len() > SYMBOLS.len() {
-                let message = format!(
-                    "plot.series: {} series cannot be told apart; give at most {}, and further ones in another plot",
-                    series.len(),
-                    SYMBOLS.len()
-                );
-                return Err(fail(lua, message));
+                bail!(lua, "plot.series: expected at most {} series, got {}", SYMBOLS.len(), series.len());
             }
             if series.iter().all(|series| series.points.is_empty()) {
-                return Err(fail(lua, "plot.series: expected at least one series with a point".to_owned()));
+                bail!(lua, "plot.series: expected at least one series with a point");
             }
             let values = |axis: usize| series.iter().flat_map(|series| &series.points).map(move |point| point[axis]);
             let of_levels = levels.iter().map(|level| level.y);
@@ -91,15 +83,14 @@ functions! {
                 ("y", &y, values(1).chain(of_levels).fold(f64::MAX, f64::min)),
             ] {
                 if axis.log && lowest <= 0.0 {
-                    let message = format!("plot.{name}.log: {lowest} has no logarithm; leave log out, or such values");
-                    return Err(fail(lua, message));
+                    bail!(lua, "plot.{name}.log: {lowest} has no logarithm; leave log out, or such values");
                 }
             }
             /// Beyond this, differences of values are not finite.
             const LARGEST: f64 = 1e300;
             let all = series.iter().flat_map(|series| series.points.iter().flatten()).chain(levels.iter().map(|level| &level.y));
             if let Some(value) = all.copied().find(|value| value.abs() > LARGEST) {
-                return Err(fail(lua, format!("plot: {value:e} is too large to be drawn; leave it out")));
+                bail!(lua, "plot: {value:e} is too large to be drawn; leave it out");
             }
             let axis = |axis: &AxisSpec, values: &mut dyn Iterator<Item = f64>| match axis.log {
                 true => Axis::decades(&axis.label, values),

@@ -2,10 +2,7 @@
 
 use mlua::{Function, Lua, Value};
 
-use crate::{
-    schema::{FromChecked, LuaType, Range, Record, RecordType, Type, choice, record, record_of},
-    vm::error::fail,
-};
+use crate::schema::{LuaType, Range, Record, RecordType, Type, choice, record, record_of};
 use softvt_policy::{
     GripHysteresis, RobotStream, SensorStreams, StatePart,
     decode::MAX_CHUNK_LEN,
@@ -44,11 +41,11 @@ record! {
     /// of the arm's joints, and a closure or a grip force. Give either joints, or position with axis_angle or
     /// quaternion; and either closure or force.
     ActionSpec: "softvt.Action" as "action" {
-        /// Position.
+        /// Position of the tool.
         position: Option<[f64; 3]> = Type::vector(3, "m, base frame");
         /// Orientation as axis-angle.
         axis_angle: Option<[f64; 3]> = Type::vector(3, "rad, base frame");
-        /// Orientation as quaternion.
+        /// Orientation of the tool, as quaternion.
         quaternion: Option<[f64; 4]> = Type::Quaternion("base frame");
         /// Positions of the arm's joints, from the base on.
         joints: Option<[f64; 7]> = Type::vector(7, "rad");
@@ -60,7 +57,7 @@ record! {
     /// One entry of the observations that are sent to a policy server.
     InputSpec: "softvt.Input" as "profile.inputs" {
         /// Keys under which it is sent.
-        keys: Vec<String>;
+        keys: Vec<String> = Type::Distinct { of: &Type::Text, by: "", min: 1 };
         /// Content: the image of a camera, its depth (m), or the object at each pixel; numbers of the robot's state;
         /// the prompt; the mosaic of 8 tactile images of both fingers; the image of one finger; the initial and the
         /// last marker positions; the last true forces on the gels; the identity of the request, a map; a seed for
@@ -74,7 +71,7 @@ record! {
         /// (quaternions), 7 (joints, joint_velocities, joint_torques), 2 (finger_pair) and 1. The sensed width
         /// has the steps and the offset of a real hand; the gap between the exact one and the commanded closure
         /// is the grip force.
-        parts: Option<Vec<StatePart>>;
+        parts: Option<Vec<StatePart>> = Type::Distinct { of: &<StatePart as LuaType>::TYPE, by: "", min: 1 };
         /// Number of control steps in the entry, the present one last, along a first axis; not for prompt and
         /// tactile_image. By default the present step without that axis, and 8 steps of marker_motion and force. The
         /// start of an episode repeats its first step.
@@ -113,7 +110,7 @@ record! {
         open: Option<f64>;
         /// Value that closes it; not for code = "force".
         closed: Option<f64>;
-        /// What the value commands. continuous: a closure in proportion between open and closed, the default. binary:
+        /// Command of the value. continuous: a closure in proportion between open and closed, the default. binary:
         /// closed beyond the middle, else open. two-width: open, or the width that the answers give just after closing,
         /// held until one opens. force: a grip force in N at which closing stops; below 0 opens.
         code: Option<GripCode>;
@@ -126,7 +123,7 @@ record! {
         /// Name in results, unless --name gives another.
         name: String = Type::Name;
         /// Observations that are sent, in order.
-        inputs: Vec<InputSpec>;
+        inputs: Vec<InputSpec> = Type::Distinct { of: InputSpec::REFERENCE, by: "", min: 1 };
         /// Meaning of the actions.
         actions: ActionEncodingSpec;
         /// True to send an observation in every control step, for policies with a history of their own. Those without a
@@ -196,15 +193,13 @@ choice! {
 }
 choice! { MarkerStyle { "dots" => Dots, "arrows" => Arrows, "black_arrows" => BlackArrows } }
 choice! { TactileMosaicLayout { "rows" => Rows, "columns" => Columns } }
-impl FromChecked for StatePart {
-    fn from_checked(value: Value, lua: &Lua) -> mlua::Result<Self> {
-        let name: String = lua.unpack(value)?;
-        Self::named(&name).ok_or_else(|| fail(lua, format!("unexpected {name:?}")))
-    }
-}
-
 impl LuaType for StatePart {
     const TYPE: Type = Type::Choice(RobotStream::PARTS);
+
+    fn from_checked(value: Value, lua: &Lua) -> mlua::Result<Self> {
+        let name: String = lua.unpack(value)?;
+        Self::named(&name).ok_or_else(|| fail!(lua, "unexpected {name:?}"))
+    }
 }
 
 choice! {

@@ -3,10 +3,7 @@
 use nalgebra::Quaternion;
 
 use super::scene::YAW;
-use crate::{
-    schema::{Range, Type, check::MIN_LENGTH, class, functions},
-    vm::error::fail,
-};
+use crate::schema::{Range, Type, check::MIN_LENGTH, class, functions};
 use softvt_geometry::{Pose, Quat, Vec3};
 use softvt_robot::rotation;
 
@@ -64,7 +61,7 @@ functions! {
         /// Returns a pose in the world frame: `softvt.pose { position = { 0.4, 0, 0.2 }, yaw = math.pi / 2 }`. Without
         /// a quaternion the hand points straight down.
         fn pose(lua) takes spec "softvt.PoseSpec" {
-            /// Position.
+            /// Position of the pose.
             position: [f64; 3] = POSITION;
             /// Rotation of the downward hand about the vertical, by default 0.
             yaw: Option<f64> = YAW;
@@ -72,8 +69,7 @@ functions! {
             quaternion: Option<[f64; 4]> = Type::Quaternion("");
         } -> ["softvt.Pose"] {
             if yaw.is_some() && quaternion.is_some() {
-                let message = "softvt.pose: quaternion gives the whole orientation, also the yaw; give one of them";
-                return Err(fail(lua, message));
+                bail!(lua, "softvt.pose: quaternion gives the whole orientation, also the yaw; give one of them");
             }
             let yaw = yaw.unwrap_or_default();
             let rotation = quaternion.and_then(rotation_from_wxyz).unwrap_or_else(|| downward(yaw));
@@ -82,7 +78,6 @@ functions! {
     }
 }
 
-/// `softvt.Pose`.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct LuaPose(pub Pose);
 
@@ -130,7 +125,7 @@ class! {
             fn interpolate(lua, this, other: LuaPose, share: f64) -> ["softvt.Pose"] {
                 if !(-MAX_SHARE_ERROR..=1.0 + MAX_SHARE_ERROR).contains(&share) {
                     let (expected, got) = (SHARE.describe(), SHARE.show_outside(share));
-                    return Err(fail(lua, format!("pose:interpolate: expected a share{expected}, got {got}")));
+                    bail!(lua, "pose:interpolate: expected a share{expected}, got {got}");
                 }
                 let at = this.0.translation.vector.lerp(&other.0.translation.vector, share);
                 // Between opposite orientations the shortest rotation is not unique, and slerp undefined.

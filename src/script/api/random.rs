@@ -2,17 +2,13 @@
 
 use std::sync::{Arc, Mutex};
 
-use mlua::{Lua, Table, Value};
+use mlua::{Table, Value};
 use rand_chacha::ChaCha8Rng;
 
-use crate::{
-    schema::{Type, class},
-    vm::error::fail,
-};
+use crate::schema::{Type, class};
 use softvt_benchmark::seed::{self, EpisodeSeed, RandomStream};
 use softvt_common::{parallel::lock, text::format_number};
 
-/// `softvt.Rng`.
 #[derive(Clone)]
 pub(crate) struct LuaRng {
     seed: EpisodeSeed,
@@ -22,16 +18,6 @@ pub(crate) struct LuaRng {
 impl LuaRng {
     pub(crate) fn new(seed: EpisodeSeed, stream: RandomStream) -> Self {
         Self { draws: Arc::new(Mutex::new(seed.stream(stream))), seed }
-    }
-}
-
-/// A draw that did not overflow.
-fn finite(lua: &Lua, method: &str, value: f64) -> mlua::Result<f64> {
-    match value.is_finite() {
-        true => Ok(value),
-        false => {
-            Err(fail(lua, format!("rng:{method}: the range is too wide for a number; give smaller bounds")))
-        }
     }
 }
 
@@ -50,29 +36,29 @@ class! {
             fn uniform(lua, this, low: f64, high: f64) -> ["number"] {
                 if low > high {
                     let [low, high] = [low, high].map(format_number);
-                    return Err(fail(lua, format!("rng:uniform: the range {low}..{high} is empty; swap them")));
+                    bail!(lua, "rng:uniform: the range {low}..{high} is empty; swap them");
                 }
-                finite(lua, "uniform", low + (high - low) * seed::uniform(&mut lock(&this.draws)))?
+                low + (high - low) * seed::uniform(&mut lock(&this.draws))
             }
             /// Returns a normally distributed number; sigma is the standard deviation.
             fn normal(lua, this, mean: f64, sigma: f64) -> ["number"] {
                 if sigma < 0.0 {
                     let sigma = format_number(sigma);
-                    return Err(fail(lua, format!("rng:normal: sigma: expected a number of 0 or more, got {sigma}")));
+                    bail!(lua, "rng:normal: sigma: expected a number of 0 or more, got {sigma}");
                 }
-                finite(lua, "normal", mean + sigma * seed::standard_normal(&mut lock(&this.draws)))?
+                mean + sigma * seed::standard_normal(&mut lock(&this.draws))
             }
             /// Returns a whole number from low to high, both included.
             fn int(lua, this, low: i64, high: i64) -> ["integer"] {
                 if low > high {
-                    return Err(fail(lua, format!("rng:int: the range {low}..{high} is empty")));
+                    bail!(lua, "rng:int: the range {low}..{high} is empty");
                 }
                 seed::uniform_integer(&mut lock(&this.draws), low, high)
             }
             /// Returns one entry of a list.
             fn choice(lua, this, list: Table = Type::List(&Type::Any)) -> ["any"] {
                 if list.raw_len() == 0 {
-                    return Err(fail(lua, "rng:choice: the list is empty"));
+                    bail!(lua, "rng:choice: the list is empty");
                 }
                 list.raw_get::<Value>(seed::uniform_integer(&mut lock(&this.draws), 1, list.raw_len() as i64))?
             }

@@ -18,11 +18,7 @@ use crate::{
     schema::{Constructed, Range, Type, class, object::read_only_list, record},
     vm::error::{app_data, author_line, fail},
 };
-use softvt_common::{
-    parallel::lock,
-    range::RangeError,
-    text::{format_number, is_control},
-};
+use softvt_common::{parallel::lock, range::RangeError, text::is_control};
 use softvt_geometry::{Aabb, Pose, Quat, Vec3};
 use softvt_physics::{STANDARD_GRAVITY, contact::Friction, fem::ElasticMaterial};
 use softvt_robot::panda::{self, ARM_DOFS};
@@ -37,11 +33,9 @@ const MAX_COORDINATE: f64 = 1e3;
 
 const POSITION: Type = Type::Vector(3, "m, world", COORDINATE);
 const COORDINATE: Range = Range::closed(-MAX_COORDINATE, MAX_COORDINATE).usually(-3.0, 3.0);
-/// Static coefficient of a coating.
 pub(crate) const COATING: Type = Type::Number("", Range::above(0.0, 10.0));
 /// Rotation about the vertical.
 pub(crate) const YAW: Type = Type::Number("rad", ANGLES);
-/// Uniform scales of objects.
 const SCALE: Type = Type::Number("", Range::closed(0.1, 10.0));
 const CORNER: Type = Type::Vector(3, "m, world", Range::ANY.usually(-5.0, 5.0));
 
@@ -82,34 +76,25 @@ record! {
 
 /// Checks joint angles against the limits of the arm, rad.
 fn check_joint_limits(lua: &Lua, q: &[f64; ARM_DOFS]) -> mlua::Result<()> {
-    for (index, (link, q)) in panda::arm_chain().links.iter().zip(q).enumerate() {
-        if !(link.lower..=link.upper).contains(q) {
-            let (lower, upper) = (link.lower, link.upper);
-            let message = format!(
-                "scene.start_q[{}]: expected radians in {lower}..{upper}, the limits of {}, got {}",
-                index + 1,
-                link.name,
-                format_number(*q)
-            );
-            return Err(fail(lua, message));
-        }
+    for (at, (link, q)) in (1..).zip(panda::arm_chain().links.iter().zip(q)) {
+        let limits = Range::closed(link.lower, link.upper);
+        let checked = limits.check(&format!("scene.start_q[{at}]"), *q, "rad");
+        checked.map_err(|error| fail(lua, error))?;
     }
     Ok(())
 }
 
-/// `softvt.Scene`.
 #[derive(Clone)]
 pub(crate) struct LuaScene {
     pub scene: Arc<Mutex<Scene>>,
     /// The task, for shifts; `None` for layouts, which several tasks may share.
     task: Option<Arc<Mutex<SceneTask>>>,
-    /// The assets read so far: two objects of one table share an asset.
+    /// Assets by their tables: two objects of one table share an asset.
     assets: Arc<Mutex<Vec<ReadAsset>>>,
 }
 
 /// The task as a shift sees and changes it.
 struct SceneTask {
-    /// Scene name of the goal's object.
     object: String,
     prompt: String,
 }
@@ -125,7 +110,6 @@ impl LuaScene {
         Self { scene: Arc::new(Mutex::new(scene)), task: None, assets: Arc::default() }
     }
 
-    /// The scene as the shifts of a task see it.
     pub(crate) fn for_task(self, object: &str, prompt: &str) -> Self {
         let task = SceneTask { object: object.to_owned(), prompt: prompt.to_owned() };
         Self { task: Some(Arc::new(Mutex::new(task))), ..self }
@@ -144,16 +128,10 @@ impl LuaScene {
 
     fn set_prompt(&self, lua: &Lua, prompt: String) -> mlua::Result<()> {
         let Some(task) = &self.task else {
-            return Err(fail(
-                lua,
-                "scene.prompt: a layout has no prompt; set it in softvt.task, whose episode_prompt sees the scene, or in a shift",
-            ));
+            bail!(lua, "scene.prompt: a layout has no prompt; set it in softvt.task or in a shift");
         };
-        if prompt.trim().is_empty() {
-            return Err(fail(lua, "scene.prompt: expected an instruction, got an empty text"));
-        }
-        if prompt.contains(is_control) {
-            return Err(fail(lua, format!("scene.prompt: expected one line of text, got {prompt:?}")));
+        if prompt.trim().is_empty() || prompt.contains(is_control) {
+            bail!(lua, "scene.prompt: expected one line of text, got {prompt:?}");
         }
         lock(task).prompt = prompt;
         Ok(())
@@ -184,12 +162,11 @@ impl LuaScene {
         let mut scene = lock(&self.scene);
         let name = spec.name.clone();
         if scene.objects.iter().any(|object| object.name == name) {
-            let message = format!("scene:add: there is an object {name:?} already; give another name");
-            return Err(fail(lua, message));
+            bail!(lua, "scene:add: there is an object {name:?} already; give another name");
         }
         // A layout that adds more contains an endless loop.
         if scene.objects.len() >= MAX_OBJECTS {
-            return Err(fail(lua, format!("scene:add: a scene holds at most {MAX_OBJECTS} objects")));
+            bail!(lua, "scene:add: a scene holds at most {MAX_OBJECTS} objects");
         }
         let at = position(lua, &scene, &spec)?;
         let rotation = Quat::from_axis_angle(&Vec3::z_axis(), spec.yaw);
@@ -208,12 +185,7 @@ impl LuaScene {
 /// Gives an object another size. `label` names the value in the message for one that cannot have it.
 fn rescale(lua: &Lua, label: &str, object: &mut Object, scale: f64) -> mlua::Result<()> {
     if !object.is_scalable() {
-        let message = format!(
-            "{label}: object {:?} is articulated, and the limits, damping and friction of its joints belong to its \
-             size; declare an asset of the size you need",
-            object.name
-        );
-        return Err(fail(lua, message));
+        bail!(lua, "{label}: object {:?} is articulated; declare an asset of that size", object.name);
     }
     object.set_scale(scale);
     Ok(())
@@ -231,21 +203,11 @@ fn position(lua: &Lua, scene: &Scene, spec: &PlacementSpec) -> mlua::Result<Vec3
                 let parts = support.asset.parts().iter().map(|part| part.name.as_str());
                 index_of(lua, &format!("scene:add: on: object {object:?}"), "part", parts, part)?;
             }
-            let height = top(support, part, x, y).ok_or_else(|| {
-                let message = format!(
-                    "scene:add: on: nothing of {on:?} is below ({}, {}) m; give `at` a point above it",
-                    format_number(x),
-                    format_number(y)
-                );
-                fail(lua, message)
-            })?;
+            let height = top(support, part, x, y)
+                .ok_or_else(|| fail!(lua, "scene:add: on: nothing of {on:?} is below ({x}, {y}) m"))?;
             Ok(Vec3::new(x, y, height))
         }
-        _ => {
-            let message =
-                "scene:add: give either at = { x, y } (with or without on) or position = { x, y, z }";
-            Err(fail(lua, message))
-        }
+        _ => Err(fail!(lua, "scene:add: give either at = {{ x, y }} or position = {{ x, y, z }}")),
     }
 }
 
@@ -305,7 +267,7 @@ class! {
             }
             /// The object of the task's goal, in shifts; nil in layouts, which several tasks may share.
             goal_object: "softvt.Object?" { get(lua, this) { this.goal_object().into_lua(lua)? } }
-            /// The light.
+            /// Key light and sky.
             light: "softvt.Light" or "its numbers are written one by one, as in scene.light.strength = …" {
                 get(_, this) { LuaLight(this.scene.clone()) }
             }
@@ -326,7 +288,7 @@ class! {
                 get(_, this) { this.prompt() }
                 set(lua, this, prompt: String) { this.set_prompt(lua, prompt)?; }
             }
-            /// Gravity.
+            /// Acceleration of gravity.
             gravity: Type::Vector(3, "m/s², world", Range::closed(-100.0, 100.0)) => gravity;
             /// Lowest corner of the workspace.
             workspace_min: CORNER => workspace.min;
@@ -357,7 +319,6 @@ class! {
     }
 }
 
-/// An object by its index in the scene.
 #[derive(Clone)]
 pub(crate) struct LuaObject {
     scene: Arc<Mutex<Scene>>,
@@ -517,7 +478,7 @@ class! {
                 match part {
                     None => object.asset.mass(),
                     Some(_) if parts.is_empty() => {
-                        return Err(fail(lua, format!("object:mass: object {:?} has no parts", object.name)));
+                        bail!(lua, "object:mass: object {:?} has no parts", object.name);
                     }
                     Some(name) => {
                         let names = parts.iter().map(|part| part.name.as_str());
@@ -528,7 +489,7 @@ class! {
             /// Multiplies the density of a soft or rigid body, or of every moving part. Static objects are unchanged.
             fn scale_mass(lua, this, factor: f64 = Type::Number("", Range::closed(1e-6, 1e6))) -> [] {
                 let scaled = Arc::make_mut(&mut lock(&this.scene).objects[this.index].asset).scale_mass(factor);
-                scaled.map_err(|error| fail(lua, format!("object:scale_mass: {error}")))?
+                scaled.map_err(|error| fail!(lua, "object:scale_mass: {error}"))?
             }
         }
     }

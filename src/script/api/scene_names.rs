@@ -25,11 +25,9 @@ const MAX_DEPTH: usize = 8;
 
 /// The table from which an expert was made, in which it names objects and joints.
 struct ExpertNames {
-    /// Name of the function that made the expert.
     label: String,
     made_at: Option<SourceLine>,
     spec: Table,
-    /// Kinds of the fields of `spec`.
     kinds: BTreeMap<String, String>,
 }
 
@@ -56,9 +54,6 @@ functions! {
 }
 
 /// Checks that a scene has the objects and joints that an expert names. Experts that state none pass.
-///
-/// # Errors
-/// A wrong name, at the line where the expert was made.
 pub(crate) fn check_expert(lua: &Lua, expert: &Function, scene: &Scene) -> mlua::Result<()> {
     check_to_depth(lua, expert, scene, MAX_DEPTH)
 }
@@ -80,7 +75,7 @@ fn check_to_depth(lua: &Lua, expert: &Function, scene: &Scene, depth: usize) -> 
         };
         if let Err(what) = checked {
             let place = made_at.clone().map(|line| find_key(lua, line, &[key]));
-            return Err(fail_at(lua, place, format!("{label}.{key}: {what}")));
+            return Err(fail_at(lua, place, format_args!("{label}.{key}: {what}")));
         }
     }
     let mut parts = sorted_pairs(spec).into_iter().filter_map(|(_, value)| value.as_function().cloned());
@@ -102,9 +97,7 @@ fn joint_value(scene: &Scene, name: &str, value: f64) -> Result<(), String> {
 }
 
 /// The joint of a part such as `cabinet.top_drawer`.
-///
-/// # Errors
-/// A fragment: the scene has no such part.
+/// The error is a fragment.
 pub(crate) fn joint<'a>(scene: &'a Scene, name: &str) -> Result<&'a Joint, String> {
     let names = scene.names();
     let parts = names.iter().map(String::as_str).filter(|name| name.contains('.'));
@@ -123,9 +116,6 @@ pub(crate) fn joint<'a>(scene: &'a Scene, name: &str) -> Result<&'a Joint, Strin
 }
 
 /// Checks that a scene has an object, or a part of one.
-///
-/// # Errors
-/// A fragment.
 fn place(scene: &Scene, name: &str) -> Result<(), String> {
     let known = scene.names();
     match known.iter().any(|known| known == name) {
@@ -135,9 +125,6 @@ fn place(scene: &Scene, name: &str) -> Result<(), String> {
 }
 
 /// Checks that a scene has an object, or a part of one, that others can touch.
-///
-/// # Errors
-/// A fragment.
 pub(crate) fn touchable(scene: &Scene, name: &str) -> Result<(), String> {
     place(scene, name)?;
     match scene.objects.iter().find(|object| object.name == name).map(|object| &object.asset.body) {
@@ -148,10 +135,6 @@ pub(crate) fn touchable(scene: &Scene, name: &str) -> Result<(), String> {
     }
 }
 
-/// Checks that an object exists and can move.
-///
-/// # Errors
-/// A fragment.
 pub(crate) fn movable_object(scene: &Scene, name: &str) -> Result<(), String> {
     let moves =
         |object: &&Object| !matches!(object.asset.body, Body::Static | Body::Articulated(_) | Body::Scenery);

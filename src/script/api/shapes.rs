@@ -18,12 +18,12 @@ use super::{
 use crate::{
     schema::{Range, Type, choice, class, functions, record_of},
     vm::{
-        error::{SourceLine, app_data, author_line, current_line, fail},
+        error::{SourceLine, app_data, author_line, current_line},
         library::{LibraryError, SharedLibrary},
         memory_budget::{Reservation, reserve},
     },
 };
-use softvt_common::{parallel::lock, text::format_number};
+use softvt_common::parallel::lock;
 use softvt_geometry::{
     Aabb, Quat, Vec3,
     import::{MeshFormat, MeshImportError, MeshImportOptions, import, import_colours},
@@ -35,7 +35,6 @@ use softvt_scene::Visual;
 
 const LENGTH: Type = Type::Number("m", Range::POSITIVE.usually(1e-6, 20.0));
 const METRES: Type = Type::Number("m", Range::ANY.usually(-5.0, 5.0));
-/// Height of a relief.
 const RELIEF: Type = Type::Number("m", Range::ANY.usually(-0.1, 0.1));
 const POINT: Type = Type::vector(3, "m");
 const CORNERS: Type = Type::List(&Type::vector(2, "m"));
@@ -45,7 +44,7 @@ choice! { Axis { "x" => X, "y" => Y, "z" => Z } }
 record_of! {
     /// A weight that rises smoothly from 0 to 1 along an axis.
     Ramp: "softvt.Ramp" as "mask" {
-        /// The axis.
+        /// Axis of the coordinate.
         axis: Axis;
         /// Coordinate at which the weight is 0.
         from: f64 = METRES;
@@ -59,7 +58,6 @@ const MAX_NODES: usize = 2000;
 const MAX_DEPTH: usize = 100;
 const MAX_WORK: f64 = 1e5;
 
-/// `softvt.Shape`.
 #[derive(Clone, Debug)]
 pub(crate) struct LuaShape(Arc<Node>);
 
@@ -86,7 +84,7 @@ impl UnusedShapes {
     }
 }
 
-/// Whether something read a shape; reports it as unused on drop otherwise.
+/// A note that a shape was read; without it the shape is reported as unused on drop.
 #[derive(Debug)]
 struct UseMark {
     is_used: AtomicBool,
@@ -113,15 +111,11 @@ impl Drop for UseMark {
 }
 
 impl LuaShape {
-    /// Line of the script that made it.
     pub(crate) fn made_at(&self) -> Option<&SourceLine> {
         self.0.use_mark.made_at.as_ref()
     }
 
     /// The visual that its mesh files state; `None` without one.
-    ///
-    /// # Errors
-    /// A file that a mesh file names cannot be read.
     pub(crate) fn file_visual(&self) -> Result<Option<Visual>, String> {
         self.0.colours.clone().map(|colours| FileColours::visual(&colours, self.shape()))
     }
@@ -140,21 +134,19 @@ impl LuaShape {
     fn new(lua: &Lua, shape: Shape, colours: Result<Vec<Arc<FileColours>>, String>) -> mlua::Result<Self> {
         let ShapeTreeSize { nodes, bytes, depth, work } = shape.tree_size();
         if work > MAX_WORK {
-            let message = "shape: cuts or unions are nested too deeply to be evaluated; join the parts by union first \
-                           (a:union(b):union(c)), then cut or join them at once";
-            return Err(fail(lua, message));
+            bail!(
+                lua,
+                "shape: cuts or unions are nested too deeply; join the parts by union first, then cut"
+            );
         }
         if nodes > MAX_NODES || depth > MAX_DEPTH {
-            return Err(fail(
+            bail!(
                 lua,
-                format!(
-                    "shape: is made of {nodes} shapes, {depth} deep; at most {MAX_NODES} and {MAX_DEPTH} can be evaluated; use \
-                     fewer, or a mesh"
-                ),
-            ));
+                "shape: is {nodes} shapes, {depth} deep, expected at most {MAX_NODES} and {MAX_DEPTH}"
+            );
         }
-        shape.validate().map_err(|error| fail(lua, format!("shape.{error}")))?;
-        let bytes = bytes + colours.iter().flatten().map(|colours| colours.bytes()).sum::<usize>();
+        shape.validate().map_err(|error| fail!(lua, "shape.{error}"))?;
+        let bytes = bytes + colours.iter().flatten().map(|colours| colours.bytes).sum::<usize>();
         let use_mark = UseMark::new(lua)?;
         Ok(Self(Arc::new(Node { shape, colours, use_mark, _reserved: reserve(lua, bytes)? })))
     }
@@ -163,7 +155,6 @@ impl LuaShape {
         Ok(app_data::<AssetCache>(lua)?.bounds(self.shape()))
     }
 
-    /// A copy of its tree.
     pub(crate) fn copy(&self) -> Shape {
         self.shape().clone()
     }
@@ -173,11 +164,7 @@ impl LuaShape {
         if self.shape().loose_bounds().size().min() > 2.0 * wall {
             return Ok(());
         }
-        let message = format!(
-            "shape:shell: a wall of {} m fills the shape; lengths are in metres",
-            format_number(wall)
-        );
-        Err(fail(lua, message))
+        Err(fail!(lua, "shape:shell: a wall of {wall} m fills the shape; lengths are in metres"))
     }
 
     /// Refuses an operation with another shape that is more than `reach` (m) away, and so changes nothing.
@@ -187,7 +174,7 @@ impl LuaShape {
         }
         let message =
             "the other shape lies outside of this one, so that nothing changes; lengths are in metres";
-        Err(fail(lua, format!("shape:{method}: {message}")))
+        Err(fail!(lua, "shape:{method}: {message}"))
     }
 
     /// Checks that a bent shape does not reach the centre of its arc, or its own other end.
@@ -201,15 +188,9 @@ impl LuaShape {
         if !overlaps(self.shape().loose_bounds()) || !overlaps(self.bounds(lua)?) {
             return Ok(());
         }
-        let message = format!(
-            "shape:bend: with a curvature of {} per m, an arc of radius {} m, the shape overlaps itself",
-            format_number(curvature),
-            format_number(1.0 / curvature.abs())
-        );
-        Err(fail(lua, message))
+        Err(fail!(lua, "shape:bend: with a curvature of {curvature} per m the shape overlaps itself"))
     }
 
-    /// A shape made of this one and `others`.
     fn derived(&self, lua: &Lua, shape: Shape, others: &[&Self]) -> mlua::Result<Self> {
         let parts = std::iter::once(self).chain(others.iter().copied());
         let colours = parts.map(|part| part.0.colours.clone()).collect::<Result<Vec<_>, String>>();
@@ -219,7 +200,7 @@ impl LuaShape {
 
 /// Makes a shape that is not made of others.
 fn build(lua: &Lua, shape: Result<Shape, ShapeError>) -> mlua::Result<LuaShape> {
-    let shape = shape.map_err(|error| fail(lua, format!("shape.{error}")))?;
+    let shape = shape.map_err(|error| fail!(lua, "shape.{error}"))?;
     LuaShape::new(lua, shape, Ok(Vec::new()))
 }
 
@@ -227,12 +208,12 @@ functions! {
     SHAPES {
         /// A box centred on the origin.
         fn box(lua) takes spec "softvt.BoxSpec" {
-            /// Edge lengths.
+            /// Edge lengths along x, y and z.
             size: [f64; 3] = POINT;
         } -> ["softvt.Shape"] { build(lua, Ok(Shape::cuboid(size.into())))? }
         /// A sphere centred on the origin.
         fn sphere(lua) takes spec "softvt.SphereSpec" {
-            /// Radius.
+            /// Radius of the sphere.
             radius: f64 = LENGTH;
         } -> ["softvt.Shape"] { build(lua, Ok(Shape::Sphere { radius }))? }
         /// An ellipsoid centred on the origin.
@@ -242,7 +223,7 @@ functions! {
         } -> ["softvt.Shape"] { build(lua, Ok(Shape::Ellipsoid { radii: 0.5 * Vec3::from(size) }))? }
         /// A capsule along the z axis, centred on the origin.
         fn capsule(lua) takes spec "softvt.CapsuleSpec" {
-            /// Radius.
+            /// Radius of the tube and its caps.
             radius: f64 = LENGTH;
             /// Total length including the caps; at least twice the radius.
             length: f64 = LENGTH;
@@ -251,9 +232,9 @@ functions! {
         }
         /// A cylinder along the z axis, centred on the origin.
         fn cylinder(lua) takes spec "softvt.CylinderSpec" {
-            /// Radius.
+            /// Radius of the cylinder.
             radius: f64 = LENGTH;
-            /// Height.
+            /// Height of the cylinder.
             height: f64 = LENGTH;
         } -> ["softvt.Shape"] { build(lua, Ok(Shape::Cylinder { radius, half_height: 0.5 * height }))? }
         /// A torus about the z axis, centred on the origin.
@@ -274,7 +255,7 @@ functions! {
         fn prism(lua) takes spec "softvt.PrismSpec" {
             /// Corners (x, z) in order.
             corners: Vec<[f64; 2]> = CORNERS;
-            /// Length along y.
+            /// Length of the prism along y.
             length: f64 = LENGTH;
         } -> ["softvt.Shape"] { build(lua, Shape::prism(corners, length))? }
         /// A profile revolved about the z axis.
@@ -303,9 +284,9 @@ functions! {
             let requester = current_line(lua).map(|line| line.file);
             let library = app_data::<SharedLibrary>(lua)?;
             let found = lock(&library).data(&file, requester.as_deref());
-            let bytes = found.map_err(|error| fail(lua, format!("softvt.mesh.file: {error}")))?.bytes;
+            let bytes = found.map_err(|error| fail!(lua, "softvt.mesh.file: {error}"))?.bytes;
             let extension = file.rsplit_once('.').map_or("", |(_, extension)| extension);
-            let refused = |error: MeshImportError| fail(lua, format!("softvt.mesh: {file}: {error}"));
+            let refused = |error: MeshImportError| fail!(lua, "softvt.mesh: {file}: {error}");
             let mesh = MeshFormat::from_extension(extension)
                 .and_then(|format| import(&bytes, format, &MeshImportOptions { scale, z_up }))
                 .map_err(refused)?;
@@ -313,7 +294,7 @@ functions! {
             let beside = |name: &str| {
                 let found = lock(&library).data(&path_beside(&file, name)?, requester.as_deref());
                 found.map(|found| found.bytes.to_vec()).map_err(|error| match error {
-                    missing @ LibraryError::NoFile { .. } => format!("{missing}; add it"),
+                    missing @ LibraryError::Missing(_) => format!("{missing}; add it"),
                     other => other.to_string(),
                 })
             };
@@ -345,7 +326,7 @@ class! {
                 let factors = match (y, z) {
                     (None, None) => Vec3::repeat(x),
                     (Some(y), Some(z)) => Vec3::new(x, y, z),
-                    _ => return Err(fail(lua, "shape:scale: expected one factor or three, got two")),
+                    _ => return Err(fail!(lua, "shape:scale: expected one factor or three, got two")),
                 };
                 this.derived(lua, this.copy().scaled(factors), &[])?
             }
@@ -358,7 +339,7 @@ class! {
                 this.check_shell(lua, wall)?;
                 this.derived(lua, this.copy().shell(wall), &[])?
             }
-            /// Joins two shapes.
+            /// Joins the shape and another one.
             fn union(lua, this, other: LuaShape) -> ["softvt.Shape"] {
                 this.derived(lua, this.copy().union(other.copy()), &[&other])?
             }
@@ -396,7 +377,7 @@ class! {
             }
             /// Rotates the shape about an axis through the origin.
             fn rotate(lua, this) takes spec "softvt.RotateSpec" {
-                /// The axis.
+                /// Axis of the rotation.
                 axis: Axis;
                 /// Right-handed angle.
                 angle: f64 = Type::Number("rad", ANGLES);
@@ -406,7 +387,7 @@ class! {
             }
             /// Twists the shape about an axis through the origin.
             fn twist(lua, this) takes spec "softvt.TwistSpec" {
-                /// The axis.
+                /// Axis of the twist.
                 axis: Axis;
                 /// Angle per length along the axis.
                 rate: f64 = Type::Number("rad/m", Range::ANY);
@@ -435,7 +416,7 @@ class! {
                 pitch: f64 = LENGTH => Number(f64::INFINITY);
                 /// Distance of ridges away from the axis; infinite if they do not depend on it.
                 radial_pitch: f64 = LENGTH => Number(f64::INFINITY);
-                /// Phase.
+                /// Phase of the ridges at the origin.
                 phase: f64 = Type::Number("rad", Range::ANY) => Number(0.0);
                 /// 1 is a sine; larger values give narrower ridges.
                 sharpness: f64 = Type::Number("", Range::closed(1.0, 8.0)) => Number(1.0);
@@ -443,7 +424,7 @@ class! {
                 mask: Option<Ramp>;
             } -> ["softvt.Shape"] {
                 if count == 0 && pitch.is_infinite() && radial_pitch.is_infinite() {
-                    return Err(fail(lua, "shape:ridges: without a count, pitch or radial_pitch it adds nothing; give one".to_owned()));
+                    bail!(lua, "shape:ridges: without a count, pitch or radial_pitch it adds nothing; give one");
                 }
                 let ridges = Ridges { axis, height, count, pitch, radial_pitch, phase, sharpness, mask };
                 this.derived(lua, this.copy().displaced(SurfaceRelief::Ridges(ridges)), &[])?
@@ -456,7 +437,7 @@ class! {
                 radius: f64 = LENGTH;
                 /// Mean distance of bumps.
                 spacing: f64 = LENGTH;
-                /// Selects their positions.
+                /// Seed of the positions of the bumps.
                 seed: u64 => Integer(0);
                 /// Weight of their height; 1 everywhere by default.
                 mask: Option<Ramp>;

@@ -9,7 +9,7 @@ use super::{
     cameras::IMAGE_EDGE,
     experiment_input,
     expert::{Coroutine, FingerAccess},
-    expert_input::{ExpertCommand, ExpertInput, TrackingErrorMonitor},
+    expert_input::{ExpertCommand, TrackingErrorMonitor, expert_view},
     image::LuaImage,
     index_of,
     observation::{FingerReadings, LuaMarkers, positions},
@@ -20,8 +20,8 @@ use super::{
 use crate::{
     schema::{Constructed, Range, Type, choice, class, functions, output},
     vm::{
-        error::{SourceLine, app_data, current_line, fail, fail_at},
-        json::{deserialize, to_json},
+        error::{SourceLine, app_data, current_line, fail_at},
+        json::to_json,
         memory_budget::{Reservation, reserve_in_world},
         value::finite,
         watchdog::Clock,
@@ -29,7 +29,7 @@ use crate::{
 };
 use softvt_benchmark::{
     seed::{EpisodeSeed, RandomStream},
-    settings::{MODEL, Settings, SettingsError},
+    settings::{MODEL, Settings},
     steps_per_control,
 };
 use softvt_common::cancel;
@@ -57,35 +57,21 @@ pub(crate) fn settings(
     place: Option<SourceLine>,
 ) -> mlua::Result<Settings> {
     let Some(table) = table else { return Ok(Settings::default()) };
-    let value = Value::Table(table.clone());
-    let settings: Settings = deserialize(lua, label, &value).map_err(|error| {
-        // The message of a single field names it.
-        let data = to_json(lua, &value, label).unwrap_or_default();
-        let wrong = leaves(String::new(), &data).into_iter().find_map(|field| {
-            match Settings::default().check_fields(&[field]) {
-                // Fields of a model that is not the default one are unknown on their own.
-                Err(SettingsError::UnknownField { known, .. }) if known.iter().any(|key| key == MODEL) => {
-                    None
-                }
-                Err(wrong @ SettingsError::UnknownField { .. }) => Some(format!("{label}: {wrong}")),
-                Err(wrong @ SettingsError::Type { .. }) => Some(format!("{label}.{wrong}")),
-                _ => None,
-            }
-        });
-        wrong.map_or(error, |wrong| fail_at(lua, place.clone(), wrong))
-    })?;
-    settings.validated().map_err(|e| fail_at(lua, place, format!("{label}: {e}")))
+    let data = to_json(lua, &Value::Table(table.clone()), label)?;
+    Settings::default()
+        .with_all(&leaves("", &data))
+        .map_err(|error| fail_at(lua, place, format_args!("{label}: {error}")))
 }
 
-/// The single values of settings, with their dotted paths.
-fn leaves(path: String, data: &Json) -> Vec<(String, String)> {
+/// The single values and the models of settings, with their dotted paths.
+fn leaves(path: &str, data: &Json) -> Vec<(String, String)> {
     match data {
-        Json::Object(group) => {
+        Json::Object(group) if !group.is_empty() && !group.contains_key(MODEL) => {
             let below = |key: &str| if path.is_empty() { key.to_owned() } else { format!("{path}.{key}") };
-            group.iter().flat_map(|(key, value)| leaves(below(key), value)).collect()
+            group.iter().flat_map(|(key, value)| leaves(&below(key), value)).collect()
         }
-        Json::String(text) => vec![(path, text.clone())],
-        other => vec![(path, other.to_string())],
+        Json::Object(group) if group.is_empty() && path.is_empty() => Vec::new(),
+        other => vec![(path.to_owned(), other.to_string())],
     }
 }
 
@@ -93,14 +79,13 @@ fn leaves(path: String, data: &Json) -> Vec<(String, String)> {
 fn simulation_settings(lua: &Lua, table: Option<&Table>) -> mlua::Result<Settings> {
     const LABEL: &str = "softvt.simulate: settings";
     if table.is_some_and(|table| table.contains_key("criteria").unwrap_or(false)) {
-        return Err(fail(lua, format!("{LABEL}.criteria: a simulation judges no episodes; leave it out")));
+        bail!(lua, "{LABEL}.criteria: a simulation judges no episodes; leave it out");
     }
     let own = settings(lua, LABEL, table, current_line(lua))?;
     experiment_input::simulation_settings(lua, &own)
-        .map_err(|e| fail(lua, format!("{LABEL}, with those of the run: {e}")))
+        .map_err(|e| fail!(lua, "{LABEL}, with those of the run: {e}"))
 }
 
-/// Measurements of an object since the simulation has settled.
 struct ObjectMeasurements {
     settled: Option<ReferenceShape>,
     d_peak_pct: f64,
@@ -132,12 +117,12 @@ impl LuaSimulation {
         let _pause = clock.pause();
         let assets = app_data::<AssetCache>(lua)?;
         let mut sim = Simulation::new(scene, &settings.physics, &settings.robot, &assets)
-            .map_err(|e| fail(lua, format!("softvt.simulate: {e}")))?;
+            .map_err(|e| fail!(lua, "softvt.simulate: {e}"))?;
         let soft_bytes: usize = sim.world.soft_bodies().iter().map(|soft| soft.state.model.bytes()).sum();
         let reserved = reserve_in_world(lua, BYTES_PER_SIMULATION + soft_bytes)?;
         sim.settle().map_err(|e| {
             let place = e.place().map_or(String::new(), |place| format!("{place}: "));
-            fail(lua, format!("softvt.simulate: {place}{e}"))
+            fail!(lua, "softvt.simulate: {place}{e}")
         })?;
         let records = sim.objects.iter().map(|object| ObjectMeasurements {
             settled: match object.body {
@@ -167,7 +152,7 @@ functions! {
     FUNCTIONS {
         /// Builds a scene with the robot and lets it settle. Deformation refers to the settled shapes.
         fn simulate(lua) takes spec "softvt.SimulateSpec" {
-            /// Initial scene.
+            /// Layout of the initial scene.
             layout: Constructed<LayoutSpec>;
             /// Part of the seed.
             suite: String => Text("experiment");
@@ -231,7 +216,7 @@ impl SimulationState {
     fn finger_readings(&mut self, lua: &Lua) -> mlua::Result<FingerReadings> {
         let frame = Sensors::frame(&self.sim);
         let readings = self.sensors.tactile_frames(&frame);
-        readings.map(Arc::new).map_err(|e| fail(lua, format!("arm:tactile: {e}")))
+        readings.map(Arc::new).map_err(|e| fail!(lua, "arm:tactile: {e}"))
     }
 
     /// True, or false and the reason of a failure.
@@ -240,27 +225,25 @@ impl SimulationState {
     }
 }
 
-/// `softvt.Simulation`.
 #[derive(Clone)]
 pub(crate) struct LuaSimulation(Arc<Mutex<SimulationState>>);
 
 impl LuaSimulation {
-    /// Runs an expert to its end.
     fn drive(&self, lua: &Lua, expert: Function) -> mlua::Result<(bool, Option<String>)> {
         let mut expert = Coroutine::new(expert, FingerAccess::Readings);
         let mut monitor = TrackingErrorMonitor::default();
         loop {
             // The expert may call the simulation itself, so it must not be locked while the expert runs.
-            let input = {
+            let (view, complaint) = {
                 let mut inner = lock(&self.0);
                 let clock = inner.clock.clone();
                 let _pause = clock.pause();
                 let readings = expert.wants_readings.then(|| inner.finger_readings(lua)).transpose()?;
                 expert.set_readings(readings);
-                ExpertInput::new(&inner.sim, inner.time(), &mut monitor)
+                (expert_view(&inner.sim, inner.time()), monitor.complaint(&inner.sim))
             };
-            let Some(command) = expert.next_command(lua, input, &mut monitor)? else { break };
-            if !lock(&self.0).control_step(Some(&command)) {
+            let command = expert.next_command(lua, &view, complaint, &mut monitor)?;
+            if !command.is_some_and(|command| lock(&self.0).control_step(Some(&command))) {
                 break;
             }
         }
@@ -277,7 +260,7 @@ impl LuaSimulation {
         width: Option<usize>,
         height: Option<usize>,
     ) -> mlua::Result<LuaImage> {
-        let wrong = |e: SensingError| fail(lua, format!("simulation:render: {e}"));
+        let wrong = |e: SensingError| fail!(lua, "simulation:render: {e}");
         let mut inner = lock(&self.0);
         let SimulationState { sim, sensors, clock, physics_steps, .. } = &mut *inner;
         let _pause = clock.pause();
@@ -298,9 +281,8 @@ impl LuaSimulation {
         let SimulationState { sim, sensors, clock, .. } = &mut *inner;
         let _pause = clock.pause();
         let frame = Sensors::frame(sim);
-        let reading = sensors
-            .tactile_reading(&frame, side)
-            .map_err(|e| fail(lua, format!("simulation:tactile: {e}")))?;
+        let reading =
+            sensors.tactile_reading(&frame, side).map_err(|e| fail!(lua, "simulation:tactile: {e}"))?;
         let wrench = frame.patches.get(side as usize).map_or(PadWrench::default(), PadWrench::from_patch);
         tactile_table(lua, reading, wrench.force)
     }
@@ -335,9 +317,6 @@ output! {
         /// Largest depth of the indentation, mm.
         depth_mm: "number" = reading.field.as_ref().map_or(0.0, |field| 1e3 * field.depth());
     }
-}
-
-output! {
     /// Measurements of an object. Fields that do not apply to it are nil.
     fn measurements(lua, inner: &SimulationState, index: usize) -> "softvt.Measurements" as "measurements" {
         /// Measured distance of the gels, m.

@@ -7,10 +7,10 @@ use mlua::{Function, Lua, Table, Value};
 use super::goals::GoalSpec;
 use crate::{
     schema::{
-        Constructed, FromChecked, LuaType, Range, Record, RecordType, Type, Unchecked, ValidationError,
-        choice, error_at_key, functions, make, record,
+        Constructed, LuaType, Range, Record, RecordType, Type, Unchecked, ValidationError, choice, functions,
+        make, record, record_of,
     },
-    vm::{error::fail, source_map::fail_at_key, value::describe},
+    vm::{source_map::fail_at_key, value::describe},
 };
 use softvt_benchmark::{
     NeededKnowledge, ObjectType, REFERENCE, TaskDifference, Teacher,
@@ -19,17 +19,11 @@ use softvt_benchmark::{
 };
 use softvt_runs::record::is_record_key;
 
-/// Type of a layout's function.
 const BUILD: Type = Type::Function("fun(scene: softvt.Scene, rng: softvt.Rng)");
 /// Type of a function that gives the prompts of the episodes of a task.
 const EPISODE_PROMPT: Type = Type::Function("fun(scene: softvt.Scene, rng: softvt.Rng): string");
-/// Type of a task's expert.
 pub(crate) const EXPERT: Type = Type::Function("fun(arm: softvt.Arm, scene: softvt.SceneState)");
-/// Smallest and largest factor.
-const FACTORS: Type = Type::Interval("", Range::closed(0.1, 10.0));
-/// Smallest and largest static coefficient of a coating.
 const COATINGS: Type = Type::Interval("", Range::above(0.0, 10.0));
-/// Type of a table of settings.
 pub(crate) const SETTINGS: Type = Type::Map(&Type::Map(&Type::Any));
 /// Class of the settings in the editor stubs, which list them group by group.
 pub(crate) const SETTINGS_CLASS: &str = "softvt.Settings";
@@ -55,9 +49,9 @@ record! {
         /// Returns the prompt of an episode, given its initial scene: for prompts that name what was drawn, as the
         /// larger of two objects or the side of the plate. It must not change the scene. Shifts come after it.
         episode_prompt: Option<Function> = EPISODE_PROMPT;
-        /// Initial scene.
+        /// Layout of the initial scene.
         layout: Constructed<LayoutSpec>;
-        /// Success criterion.
+        /// Success criterion of the task.
         goal: GoalSpec;
         /// Scene name of the object whose deformation and grip the records hold; by default the first that the goal
         /// names. A goal of joints or functions alone needs it.
@@ -76,66 +70,23 @@ record! {
         unit: String => Text("1");
         /// Value that changes nothing.
         default: f64;
-        /// Lowest value.
+        /// Lowest value that is accepted.
         min: Option<f64>;
-        /// Highest value.
+        /// Highest value that is accepted.
         max: Option<f64>;
         /// Changes the scene; may return another one. scene.goal_object is the object of the task's goal and
         /// scene.prompt the instruction. Draw from rng:stream "camera", "light", "material" or "sensor",
         /// whichever the shift changes.
         apply: Function = Type::Function("fun(scene: softvt.Scene, value: number, rng: softvt.Rng): softvt.Scene?");
     }
-    /// Ranges from which every episode of a suite draws: factors on size, stiffness, density and friction of each
-    /// soft object, its colour, the light and the poses of the cameras. The policy sees none of the drawn
-    /// numbers; records do.
-    VariationSpec: "softvt.Variation" as "variation", constructor "softvt.variation" {
-        /// Name in results.
-        name: String = Type::Name;
-        /// Smallest and largest factor on the size of a soft object, uniform.
-        size: [f64; 2] = FACTORS;
-        /// Factors on Young's modulus, log-uniform.
-        stiffness: [f64; 2] = FACTORS;
-        /// Factors on the density, log-uniform.
-        density: [f64; 2] = FACTORS;
-        /// Factors on the coefficients of friction, log-uniform. A pair of surfaces takes the larger coefficient.
-        friction: [f64; 2] = FACTORS;
-        /// Largest relative change of each colour channel of a soft object.
-        colour: f64 = Type::Number("", Range::closed(0.0, 0.9));
-        /// Factors on the strength of lamp and sky, log-uniform.
-        light: [f64; 2] = FACTORS;
-        /// Largest displacement along each axis of the cameras that are fixed to the world.
-        camera_offset: f64 = Type::Number("m", Range::closed(0.0, 1.0));
-        /// Largest rotation of these cameras about each of their axes.
-        camera_rotation: f64 = Type::Number("rad", Range::closed(0.0, 1.0));
-        /// Properties of the soft objects that do not show.
-        hidden: Option<HiddenSpec>;
-    }
-    /// Ranges of properties that do not show, drawn log-uniform for each soft object. Size, colour and looks do not
-    /// depend on them. An instance is drawn again until the ratio of its largest to its smallest safe grip force is
-    /// within window_ratio by the draw reference of the asset, which its first calibration writes and later ones keep.
-    /// Policies never see these numbers; records have them, with the ratio by the present calibration.
-    HiddenSpec: "softvt.Hidden" as "variation.hidden" {
-        /// Relative density of the foam: a factor on the density, and by its square on Young's modulus.
-        aeration: [f64; 2] = FACTORS;
-        /// Age: a factor on Young's modulus; the collapse and damage strains shrink by its power 0.7, and τ of
-        /// the instance with them.
-        staling: [f64; 2] = FACTORS;
-        /// Factor on the mass.
-        filling: [f64; 2] = FACTORS;
-        /// Static friction of a coating (flour, oil, glaze), which acts between the object and
-        /// everything that it touches.
-        coating: [f64; 2] = COATINGS;
-        /// Largest over smallest safe grip force of the instances that are kept, at least 1.
-        window_ratio: [f64; 2] = Type::Interval("", Range::closed(1.0, 1000.0));
-    }
-    /// A number of each episode, beside the verdict: of the true state, which policies do not see.
+    /// A number of each episode in addition to its verdict, from the true state, which policies do not see.
     MetricSpec: "softvt.Metric" as "metric", constructor "softvt.metric", relation Checked(check_metric) {
         /// Name in records and tables, with its unit, as tilt_deg; none that records have already, as safety.
         name: String = Type::Name;
         /// Returns the value after a control step, or nil where it has none. `step` is a row of the trace
         /// (docs/results.md): forces of the pads, D of each object, what touches what.
         of: Function = Type::Function("fun(scene: softvt.SceneState, step: table): number?");
-        /// How the values of an episode become one: "last", "max", "min" or "mean".
+        /// Reduction of the values of an episode: "last", "max", "min" or "mean".
         over: Reduction => Text("last");
     }
     /// A set of tasks that are reported together.
@@ -146,7 +97,7 @@ record! {
         object_type: ObjectType;
         /// Difference between the tasks.
         tasks_differ_in: TaskDifference;
-        /// What a controller has to know of an instance to grip it safely, as softvt list suites prints it: "nothing"
+        /// Knowledge of an instance that a safe grip needs, as softvt list suites prints it: "nothing"
         /// but its kind, its "size", or what only a "trial" tells. softvt scripts/blind_bounds.lua estimates it.
         needs: Option<NeededKnowledge>;
         /// Default number of episodes per task.
@@ -156,11 +107,11 @@ record! {
         /// Changes of the scene that a run can request.
         shifts: Vec<Constructed<ShiftSpec>>
             = Type::Distinct { of: Constructed::<ShiftSpec>::REFERENCE, by: "name", min: 0 } => Empty;
-        /// Numbers of each episode that records and tables show beside the verdict.
+        /// Numbers of each episode that records and tables show in addition to the verdict.
         metrics: Vec<Constructed<MetricSpec>>
             = Type::Distinct { of: Constructed::<MetricSpec>::REFERENCE, by: "name", min: 0 } => Empty;
         /// Ranges from which the soft objects, the light and the cameras of every episode are drawn.
-        vary: Option<Constructed<VariationSpec>>;
+        vary: Option<Constructed<VariationRanges>>;
         /// Changed settings (docs/settings.md): { physics = {…}, robot = {…}, criteria = {…}, tactile = {…}, cameras =
         /// {…} }.
         settings: Option<Table> = SETTINGS;
@@ -189,7 +140,7 @@ record! {
     }
     /// Runs suites as they are, then under each condition, and compares them episode by episode.
     ConditionsSpec: "softvt.Conditions" as "conditions", constructor "softvt.conditions", relation Checked(check_conditions) {
-        /// Name in results.
+        /// Name of the plan in results.
         name: String = Type::Name;
         /// The suites, in order.
         suites: Vec<Constructed<SuiteSpec>> = Type::Distinct { of: Constructed::<SuiteSpec>::REFERENCE, by: "", min: 1 };
@@ -198,7 +149,7 @@ record! {
     }
     /// A function that is evaluated at points and returns rows of results. Give either grid or points.
     ExperimentSpec: "softvt.Experiment" as "experiment", constructor "softvt.experiment" {
-        /// Name in results.
+        /// Name of the experiment in results.
         name: String = Type::Name;
         /// Result of softvt.options, passed to the functions below as opt.
         options: Option<Value>;
@@ -211,7 +162,7 @@ record! {
         /// new run of the script: variables that one changes are not seen by others. Reading a field of the point that
         /// is no parameter of the grid, or a misspelt one of `points`, is an error.
         run: Function = Type::Function("fun(point: table, opt: table): table|table[]");
-        /// Summarizes all rows.
+        /// Summarizes the rows of all points.
         finish: Option<Function> = Type::Function("fun(rows: table[], opt: table): softvt.Finish?");
         /// Columns of the table, in order; by default all, sorted.
         columns: Vec<String> = Type::Distinct { of: &Type::Text, by: "", min: 0 } => Empty;
@@ -232,19 +183,72 @@ record! {
     }
 }
 
+record_of! {
+    /// Ranges from which every episode of a suite draws: factors on size, stiffness, density and friction of each
+    /// soft object, its colour, the light and the poses of the cameras. The policy sees none of the drawn
+    /// numbers; records do.
+    VariationRanges: "softvt.Variation" as "variation", constructor "softvt.variation" {
+        /// Name of the variation in results.
+        name: String = Type::Name;
+        /// Smallest and largest factor on the size of a soft object, uniform.
+        size: FactorRange;
+        /// Factors on Young's modulus, log-uniform.
+        stiffness: FactorRange;
+        /// Factors on the density, log-uniform.
+        density: FactorRange;
+        /// Factors on the coefficients of friction, log-uniform. A pair of surfaces takes the larger coefficient.
+        friction: FactorRange;
+        /// Largest relative change of each colour channel of a soft object.
+        colour: f64 = Type::Number("", Range::closed(0.0, 0.9));
+        /// Factors on the strength of lamp and sky, log-uniform.
+        light: FactorRange;
+        /// Largest displacement along each axis of the cameras that are fixed to the world.
+        camera_offset: f64 = Type::Number("m", Range::closed(0.0, 1.0));
+        /// Largest rotation of these cameras about each of their axes.
+        camera_rotation: f64 = Type::Number("rad", Range::closed(0.0, 1.0));
+        /// Properties of the soft objects that do not show.
+        hidden: Option<HiddenRanges>;
+    }
+    /// Ranges of properties that do not show, drawn log-uniform for each soft object. Size, colour and looks do not
+    /// depend on them. An instance is drawn again until the ratio of its largest to its smallest safe grip force is
+    /// within window_ratio by the draw reference of the asset, which its first calibration writes and later ones keep.
+    /// Policies never see these numbers; records have them, with the ratio by the present calibration.
+    HiddenRanges: "softvt.Hidden" as "variation.hidden" {
+        /// Relative density of the foam: a factor on the density, and by its square on Young's modulus.
+        aeration: FactorRange;
+        /// Age: a factor on Young's modulus; the collapse and damage strains shrink by its power 0.7, and τ of
+        /// the instance with them.
+        staling: FactorRange;
+        /// Factor on the mass.
+        filling: FactorRange;
+        /// Static friction of a coating (flour, oil, glaze), which acts between the object and
+        /// everything that it touches.
+        coating: FactorRange = COATINGS;
+        /// Largest over smallest safe grip force of the instances that are kept, at least 1.
+        window_ratio: FactorRange = Type::Interval("", Range::closed(1.0, 1000.0));
+    }
+}
+
+impl LuaType for FactorRange {
+    const TYPE: Type = Type::Interval("", Range::closed(0.1, 10.0));
+
+    fn from_checked(value: Value, lua: &Lua) -> mlua::Result<Self> {
+        lua.unpack(value).map(|[min, max]: [f64; 2]| Self { min, max })
+    }
+}
+
 /// Constructors of plans and their parts; that of layouts is a function.
 pub(crate) static CONSTRUCTORS: &[&Record] = &[
     SuiteSpec::RECORD,
     TaskSpec::RECORD,
     ShiftSpec::RECORD,
     MetricSpec::RECORD,
-    VariationSpec::RECORD,
+    VariationRanges::RECORD,
     ConditionsSpec::RECORD,
     ExperimentSpec::RECORD,
 ];
 
 impl MetricSpec {
-    /// As plain data.
     pub(crate) fn plain(&self) -> Metric {
         Metric { name: self.name.clone(), over: self.over }
     }
@@ -252,9 +256,6 @@ impl MetricSpec {
 
 impl Constructed<TaskSpec> {
     /// Scene name of the object whose deformation and grip the records hold.
-    ///
-    /// # Errors
-    /// Neither the task nor its goal names one.
     pub(crate) fn object_name(&self, lua: &Lua) -> mlua::Result<String> {
         if let Some(name) = &self.object {
             return Ok(name.clone());
@@ -287,54 +288,27 @@ functions! {
                 }
                 (_, Value::Nil) => make(lua, LayoutSpec::RECORD, &name.0)?,
                 (name, _) => {
-                    let message = format!("layout: expected a name and a function, got {}", describe(name));
-                    return Err(fail(lua, message));
+                    bail!(lua, "layout: expected a name and a function, got {}", describe(name));
                 }
             }
         }
     }
 }
 
-/// Refuses the name of a measure of the verdict, which tables would show beside it.
-fn check_metric(lua: &Lua, record: &Record, table: &Table) -> mlua::Result<()> {
-    let name = table.raw_get::<String>("name")?;
-    if !is_record_key(&name) {
-        return Ok(());
-    }
-    let message = format!("{name:?} is a field of every record; give another name");
-    Err(error_at_key(lua, record.label, &ValidationError { path: vec!["name".into()], message }))
-}
-
-impl VariationSpec {
-    /// The ranges as plain data.
-    pub(crate) fn ranges(&self) -> VariationRanges {
-        let range = |[min, max]: [f64; 2]| FactorRange { min, max };
-        VariationRanges {
-            name: self.name.clone(),
-            size: range(self.size),
-            stiffness: range(self.stiffness),
-            density: range(self.density),
-            friction: range(self.friction),
-            colour: self.colour,
-            light: range(self.light),
-            camera_offset_m: self.camera_offset,
-            camera_rotation_rad: self.camera_rotation,
-            hidden: self.hidden.as_ref().map(|hidden| HiddenRanges {
-                aeration: range(hidden.aeration),
-                staling: range(hidden.staling),
-                filling: range(hidden.filling),
-                coating: range(hidden.coating),
-                window_ratio: range(hidden.window_ratio),
-            }),
+/// Refuses the name of a measure of the verdict, which tables show too.
+fn check_metric(_: &Lua, table: &Table) -> Result<(), ValidationError> {
+    match table.raw_get::<String>("name")? {
+        name if is_record_key(&name) => {
+            Err(mismatch!("{name:?} is a field of every record; give another name").inside("name"))
         }
+        _ => Ok(()),
     }
 }
 
 /// Refuses a condition with the name of the run without changes.
-fn check_conditions(lua: &Lua, record: &Record, table: &Table) -> mlua::Result<()> {
+fn check_conditions(lua: &Lua, table: &Table) -> Result<(), ValidationError> {
     let conditions = Vec::<ConditionSpec>::from_checked(table.raw_get("conditions")?, lua)?;
     let Some(at) = conditions.iter().position(|condition| condition.name == REFERENCE) else { return Ok(()) };
-    let message = format!("{REFERENCE:?} is the name of the run without changes; give another");
-    let path = vec!["conditions".into(), format!("[{}]", at + 1), "name".into()];
-    Err(error_at_key(lua, record.label, &ValidationError { path, message }))
+    let error = mismatch!("{REFERENCE:?} is the name of the run without changes; give another");
+    Err(error.inside("name").inside(format!("[{}]", at + 1)).inside("conditions"))
 }

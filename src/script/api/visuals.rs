@@ -9,10 +9,7 @@ use super::{
     pose::{ANGLES, direction},
     shapes::LuaShape,
 };
-use crate::{
-    schema::{FieldDefault, FromChecked, LuaType, Range, Type, choice, class, functions, invalid, record_of},
-    vm::error::fail,
-};
+use crate::schema::{FieldDefault, LuaType, Range, Type, choice, class, functions, invalid, record_of};
 use softvt_common::{parallel::lock, text::AXIS_NAMES};
 use softvt_scene::{LabelLine, MAX_LETTERS, Mask, Scene, TextDecal, Typeface, Visual, VisualLayer};
 
@@ -31,7 +28,7 @@ const MAX_PARTS: usize = 200;
 record_of! {
     /// The appearance of a surface: a base material, and layers painted over it in order.
     Visual: "softvt.Visual" as "visual" {
-        /// Base colour.
+        /// Colour of the base.
         albedo: [f64; 3] = ALBEDO;
         /// Roughness: 0 is a mirror, 1 is chalk.
         roughness: f64 = SHARE => Number(0.6);
@@ -39,12 +36,12 @@ record_of! {
         metalness: f64 = SHARE => Number(0.0);
         /// Layers painted over the base, in this order.
         layers: Vec<VisualLayer> => Empty;
-    } by make_visual;
+    } by |_| Ok(Visual { layers, ..Visual::plain(albedo, roughness, metalness) });
     /// A colour laid over the layers below where a mask is not 0.
     VisualLayer: "softvt.Layer" as "layer" {
         /// Weight of the layer; 1 everywhere by default.
         mask: Mask;
-        /// Colour.
+        /// Colour of the layer.
         albedo: [f64; 3] = ALBEDO;
         /// Roughness: 0 is a mirror, 1 is chalk.
         roughness: f64 = SHARE => Number(0.6);
@@ -53,16 +50,6 @@ record_of! {
         /// Height of the drawn surface where the mask is 1. It is drawn only: contact does not see it.
         relief_m: f64 = Type::Number("m", Range::closed(-0.005, 0.005)) => Number(0.0);
     }
-}
-
-fn make_visual(
-    _: &Lua,
-    albedo: [f64; 3],
-    roughness: f64,
-    metalness: f64,
-    layers: Vec<VisualLayer>,
-) -> mlua::Result<Visual> {
-    Ok(Visual { layers, ..Visual::plain(albedo, roughness, metalness) })
 }
 
 choice! { Typeface { "sans" => Sans, "mono" => Mono } }
@@ -74,7 +61,9 @@ const FACING: Type = Type::Direction(&["+x", "-x", "+y", "-y", "+z", "-z"], "any
 #[derive(Clone, Copy, Debug)]
 struct Direction([f64; 3]);
 
-impl FromChecked for Direction {
+impl LuaType for Direction {
+    const TYPE: Type = AXIS;
+
     fn from_checked(value: Value, lua: &Lua) -> mlua::Result<Self> {
         let Value::String(name) = &value else {
             let numbers = lua.unpack(value)?;
@@ -86,15 +75,12 @@ impl FromChecked for Direction {
     }
 }
 
-impl LuaType for Direction {
-    const TYPE: Type = AXIS;
-}
-
-/// One size for all axes, or one for each.
 #[derive(Clone, Copy, Debug)]
 struct Sizes([f64; 3]);
 
-impl FromChecked for Sizes {
+impl LuaType for Sizes {
+    const TYPE: Type = Type::OneOf(&[LENGTH, Type::Vector(3, "m", LENGTHS)]);
+
     fn from_checked(value: Value, lua: &Lua) -> mlua::Result<Self> {
         match value {
             Value::Table(_) => lua.unpack(value).map(Self),
@@ -103,11 +89,6 @@ impl FromChecked for Sizes {
     }
 }
 
-impl LuaType for Sizes {
-    const TYPE: Type = Type::OneOf(&[LENGTH, Type::Vector(3, "m", LENGTHS)]);
-}
-
-/// `softvt.Mask`.
 #[derive(Clone, Debug)]
 pub(crate) struct LuaMask(Arc<MaskNode>);
 
@@ -121,30 +102,24 @@ struct MaskNode {
 impl LuaMask {
     fn new(lua: &Lua, mask: Mask, parts: usize) -> mlua::Result<Self> {
         if parts > MAX_PARTS {
-            let message = format!(
-                "mask: is made of {parts} masks; at most {MAX_PARTS} can be drawn; use fewer, or more layers"
-            );
-            return Err(fail(lua, message));
+            bail!(lua, "mask: is made of {parts} masks, expected at most {MAX_PARTS}; use more layers");
         }
         Ok(Self(Arc::new(MaskNode { mask: Arc::new(mask), parts })))
     }
 
-    /// A mask that is not made of others.
     fn simple(lua: &Lua, mask: Mask) -> mlua::Result<Self> {
         Self::new(lua, mask, 1)
-    }
-}
-
-impl FromChecked for Mask {
-    fn from_checked(value: Value, lua: &Lua) -> mlua::Result<Self> {
-        let mask: Option<LuaMask> = lua.unpack(value)?;
-        Ok(mask.map_or(Self::Whole, |mask| (*mask.0.mask).clone()))
     }
 }
 
 impl LuaType for Mask {
     const TYPE: Type = LuaMask::TYPE;
     const PRESENCE: FieldDefault = FieldDefault::Optional;
+
+    fn from_checked(value: Value, lua: &Lua) -> mlua::Result<Self> {
+        let mask: Option<LuaMask> = lua.unpack(value)?;
+        Ok(mask.map_or(Self::Whole, |mask| (*mask.0.mask).clone()))
+    }
 }
 
 class! {
@@ -176,7 +151,7 @@ fn check_ramp(lua: &Lua, label: &str, [from, to]: [f64; 2], keys: [&str; 2]) -> 
     if from != to {
         return Ok(());
     }
-    Err(invalid(lua, label, keys[1], format!("expected a number other than {}, got the same", keys[0])))
+    Err(invalid(lua, label, keys[1], format_args!("expected a number other than {}, got the same", keys[0])))
 }
 
 functions! {
@@ -197,7 +172,7 @@ functions! {
         } -> ["softvt.Mask"] { LuaMask::simple(lua, Mask::Stripes { axis: axis.0, pitch_m, share })? }
         /// Rises smoothly from 0 to 1 along an axis.
         fn gradient(lua) takes spec "softvt.GradientMask" {
-            /// Direction.
+            /// Direction of the gradient.
             axis: Direction => Text("z");
             /// Coordinate at which it is 0.
             from_m: f64 = COORDINATE;
@@ -217,7 +192,7 @@ functions! {
             from: f64 = NOISE_VALUE => Number(0.35);
             /// Value of the noise that becomes 1; may be below from.
             to: f64 = NOISE_VALUE => Number(0.65);
-            /// Selects the pattern.
+            /// Seed of the pattern.
             seed: u32 => Integer(0);
         } -> ["softvt.Mask"] {
             check_ramp(lua, "mask.noise", [from, to], ["from", "to"])?;
@@ -231,7 +206,7 @@ functions! {
             pitch_m: f64 = LENGTH;
             /// Amplitude of the distortion.
             wobble_m: f64 = LENGTH => Number(0.01);
-            /// Selects the pattern.
+            /// Seed of the pattern.
             seed: u32 => Integer(0);
         } -> ["softvt.Mask"] { LuaMask::simple(lua, Mask::Rings { centre_m, pitch_m, wobble_m, seed })? }
         /// Boards along x, side by side in y, with one value per board.
@@ -240,7 +215,7 @@ functions! {
             length_m: f64 = LENGTH;
             /// Width of a board.
             width_m: f64 = LENGTH;
-            /// Selects the pattern.
+            /// Seed of the pattern.
             seed: u32 => Integer(0);
         } -> ["softvt.Mask"] { LuaMask::simple(lua, Mask::Boards { length_m, width_m, seed })? }
         /// The gaps between boards of these sizes.
@@ -252,13 +227,13 @@ functions! {
             /// Width of a gap.
             gap_m: f64 = LENGTH;
         } -> ["softvt.Mask"] { LuaMask::simple(lua, Mask::Seams { length_m, width_m, gap_m })? }
-        /// Scattered round specks.
+        /// Round specks, scattered in space.
         fn specks(lua) takes spec "softvt.SpecksMask" {
-            /// Mean distance.
+            /// Mean distance of the specks.
             spacing_m: f64 = LENGTH;
             /// Radius, at most half the spacing.
             radius_m: f64 = LENGTH;
-            /// Selects the pattern.
+            /// Seed of the pattern.
             seed: u32 => Integer(0);
         } -> ["softvt.Mask"] {
             if radius_m > 0.5 * spacing_m {
@@ -273,7 +248,7 @@ functions! {
         } -> ["softvt.Mask"] { LuaMask::simple(lua, Mask::Weave { pitch_m })? }
         /// Surfaces that face a direction, by the cosine between their normal and that direction.
         fn facing(lua) takes spec "softvt.FacingMask" {
-            /// Direction.
+            /// Direction that is compared with the normals.
             axis: Direction => Text("z");
             /// Cosine at which it is 0.
             from: f64 = COSINE => Number(0.0);
@@ -285,7 +260,7 @@ functions! {
         }
         /// The inside of a shape: a painted rim, the grooves between ridges.
         fn inside(lua) takes spec "softvt.InsideMask" {
-            /// The shape.
+            /// Shape whose inside is 1.
             shape: LuaShape;
             /// Width of the border, half of it on either side of the shape's surface.
             soft_m: f64 = Type::Number("m", Range::NOT_NEGATIVE) => Number(0.0);
@@ -309,7 +284,7 @@ functions! {
             wrap_m: Option<f64> = LENGTH;
             /// Thickening of the strokes, in heights of a capital letter.
             weight: f64 = Type::Number("", Range::closed(0.0, 0.25)) => Number(0.08);
-            /// Typeface.
+            /// Typeface of the letters.
             font: Typeface => Text("sans");
         } -> ["softvt.Mask"] {
             let facing = facing.0;
@@ -320,7 +295,6 @@ functions! {
     }
 }
 
-/// Checks that a line of text can be printed.
 fn check_label(lua: &Lua, line: &LabelLine) -> mlua::Result<()> {
     let wrong = |key: &str, message: String| Err(invalid(lua, "mask.text", key, message));
     let count = line.text.chars().count();
@@ -352,22 +326,15 @@ pub(crate) fn visuals_of(
     if visuals.is_empty() {
         let mut plain = vec![Visual::default(); needed];
         let own = shape.file_visual().map_err(|error| {
-            let message = format!(
-                "asset {name}: visuals: the colours of its mesh cannot be read: {error}, or give the asset visuals"
-            );
-            fail(lua, message)
+            let what = "the colours of its mesh cannot be read";
+            fail!(lua, "asset {name}: visuals: {what}: {error}, or give the asset visuals")
         })?;
         plain[0] = own.unwrap_or_default();
         return Ok(plain);
     }
     if visuals.len() < needed {
-        let message = format!(
-            "asset {name}: visuals: the shape is painted with material {}, expected {needed} visuals, got {}; the first is \
-             that of material 0",
-            needed - 1,
-            visuals.len()
-        );
-        return Err(fail(lua, message));
+        let (last, got) = (needed - 1, visuals.len());
+        bail!(lua, "asset {name}: visuals: the shape has materials 0 to {last}, got {got} visuals");
     }
     Ok(visuals.to_vec())
 }
@@ -381,7 +348,6 @@ pub(crate) struct LuaMaterial {
 }
 
 impl LuaMaterial {
-    /// The materials of an object, by material id.
     pub(crate) fn all(scene: &Arc<Mutex<Scene>>, object: usize) -> Vec<Self> {
         let count = lock(scene).objects[object].asset.visuals.len();
         (0..count).map(|index| Self { scene: scene.clone(), object, index }).collect()
@@ -402,7 +368,7 @@ class! {
     LuaMaterial: "softvt.Material" {
         label(_) { "material".to_owned() }
         writable {
-            /// Base colour.
+            /// Colour of the base.
             albedo: ALBEDO => albedo;
             /// Roughness: 0 is a mirror, 1 is chalk.
             roughness: SHARE => roughness;

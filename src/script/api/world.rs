@@ -7,11 +7,11 @@ use std::{
 };
 
 use cpu_time::ThreadTime;
-use mlua::Lua;
+use mlua::{Lua, Value};
 
 use super::{assets::STRAIN, experiment_input, shapes::LuaShape};
 use crate::{
-    schema::{Constructed, Range, Type, class, functions, output, record},
+    schema::{ApiObject, Constructed, LuaType, Range, Type, class, functions, output, record},
     vm::{
         error::{app_data, fail, fail_at, library_is_running},
         memory_budget::{Reservation, reserve_in_world},
@@ -27,7 +27,7 @@ use softvt_common::{
 use softvt_evaluation::deformation::{Deformation, ReferenceShape};
 use softvt_geometry::{Pose, Quat, Vec3, shape::Shape};
 use softvt_physics::{
-    BodyId, ColliderId, ContactPartner, KinematicId, PhysicsParams, SoftId, World,
+    AttachmentId, BodyId, ColliderId, ContactPartner, KinematicId, PhysicsParams, SoftId, World,
     contact::{Collider, Friction, SurfaceStiffness},
     fem::{FemState, StrainLimits, StrainMeter},
     world::{ContactSummary, Penetration, SoftBody, StepFailure},
@@ -39,6 +39,8 @@ use softvt_scene::SoftMaterial;
 /// Approximate memory of a world and of one of its solids.
 const BYTES_PER_WORLD: usize = 16 << 10;
 const BYTES_PER_SOLID: usize = 4 << 10;
+/// Memory of an attachment per node of its body, at most.
+const BYTES_PER_NODE: usize = 64;
 
 const POSITION: Type = Type::vector(3, "m");
 const PERCENT: Type = Type::Number("%", Range::closed(0.0, 100.0));
@@ -47,9 +49,9 @@ const AXIS_ANGLE: Type = Type::vector(3, "rad");
 record! {
     /// A solid that moves as prescribed (kinematic) or never (static).
     WorldSolidSpec: "softvt.WorldSolid" as "world:solid" {
-        /// Name in messages.
+        /// Name of the solid in messages.
         name: String => Text("solid");
-        /// Shape.
+        /// Shape of the solid.
         shape: LuaShape;
         /// Friction of its surface.
         friction: Friction;
@@ -60,10 +62,25 @@ record! {
     }
 }
 
+/// The other side of an attachment.
+#[derive(Clone)]
+enum Holder {
+    World,
+    Solid(LuaSolid),
+}
+
+impl LuaType for Holder {
+    const TYPE: Type = Type::OneOf(&[Type::Object(LuaSolid::NAME), Type::Choice(&["world"])]);
+
+    fn from_checked(value: Value, lua: &Lua) -> mlua::Result<Self> {
+        if value.is_string() { Ok(Self::World) } else { lua.unpack(value).map(Self::Solid) }
+    }
+}
+
 record! {
     /// A gel pad of the robot on a rigid carrier that solid:move_to moves.
     WorldGelPadSpec: "softvt.WorldGelPad" as "world:gel_pad" {
-        /// Name in messages.
+        /// Name of the pad in messages.
         name: String => Text("gel pad");
         /// Position of its apex.
         position: [f64; 3] = POSITION;
@@ -131,14 +148,18 @@ impl fmt::Display for Timing {
     }
 }
 
-/// A world with its reference shapes and its timing.
+/// A soft body with the measures of its deformation.
+struct MeasuredBody {
+    shape: Shape,
+    reference: ReferenceShape,
+    strain: StrainMeter,
+    stable_strain: Option<f64>,
+}
+
 struct Inner {
     world: World,
-    /// Shapes of the soft bodies.
-    shapes: Vec<Shape>,
-    references: Vec<ReferenceShape>,
-    strains: Vec<StrainMeter>,
-    stable_strains: Vec<Option<f64>>,
+    /// Soft bodies by their index in the world.
+    bodies: Vec<MeasuredBody>,
     failed: Option<StepFailure>,
     newton_total: u64,
     newton_max: u32,
@@ -160,7 +181,7 @@ impl Inner {
         let Some(penetration) = found.next() else { return Ok(()) };
         let [first, second] = penetration.bodies.map(|body| self.world.partner_name(body));
         let depth = significant(1e3 * penetration.depth, 3);
-        Err(fail(lua, format!("{first:?} and {second:?} overlap by {depth} mm; move them apart")))
+        Err(fail!(lua, "{first:?} and {second:?} overlap by {depth} mm; move them apart"))
     }
 }
 
@@ -204,14 +225,11 @@ functions! {
                 ..default
             };
             let params = experiment_input::world_params(lua, params)
-                .map_err(|e| fail(lua, format!("softvt.world, with the settings of the run: {e}")))?;
+                .map_err(|e| fail!(lua, "softvt.world, with the settings of the run: {e}"))?;
             let gravity = gravity.map_or(softvt_physics::STANDARD_GRAVITY, Vec3::from);
             LuaWorld(Arc::new(Mutex::new(Inner {
                 world: World::new(params, gravity),
-                shapes: Vec::new(),
-                references: Vec::new(),
-                strains: Vec::new(),
-                stable_strains: Vec::new(),
+                bodies: Vec::new(),
                 failed: None,
                 newton_total: 0,
                 newton_max: 0,
@@ -223,7 +241,6 @@ functions! {
     }
 }
 
-/// `softvt.World`.
 #[derive(Clone)]
 pub(crate) struct LuaWorld(SharedWorld);
 
@@ -253,64 +270,92 @@ impl LuaWorld {
         };
         let reserved = reserve_in_world(lua, model.bytes())?;
         let reference = ReferenceShape::new(&model.mesh.nodes, &model.mass).map_err(|e| wrong(&e))?;
-        let strains = StrainMeter::new(&model, StrainLimits::default());
+        let strain = StrainMeter::new(&model, StrainLimits::default());
         let id = inner.world.add_soft(name, model, Some(Arc::new(shape.clone())), &pose, friction);
-        inner.shapes.push(shape.clone());
-        inner.references.push(reference);
-        inner.strains.push(strains);
-        inner.stable_strains.push(body.stable_strain());
+        let (shape, stable_strain) = (shape.clone(), body.stable_strain());
+        inner.bodies.push(MeasuredBody { shape, reference, strain, stable_strain });
         inner.reserved.push(reserved);
         inner.refuse_overlap(lua, id.into())?;
         Ok(LuaBody { world: self.0.clone(), id })
     }
 
-    fn add_solid(&self, lua: &Lua, spec: &WorldSolidSpec, is_kinematic: bool) -> mlua::Result<LuaSolid> {
-        let at = pose(spec.position, spec.axis_angle);
-        let reserved = reserve_in_world(lua, BYTES_PER_SOLID + spec.shape.bytes())?;
+    /// Adds a solid of so many bytes at a pose, on a carrier if it is kinematic. `add` gets its parent, and its pose on
+    /// that.
+    fn add_solid(
+        &self,
+        lua: &Lua,
+        bytes: usize,
+        at: Pose,
+        is_kinematic: bool,
+        add: impl FnOnce(&mut World, BodyId, Pose) -> ColliderId,
+    ) -> mlua::Result<LuaSolid> {
+        let reserved = reserve_in_world(lua, BYTES_PER_SOLID + bytes)?;
         let mut inner = lock(&self.0);
         inner.reserved.push(reserved);
-        let world = &mut inner.world;
-        let kinematic = is_kinematic.then(|| world.add_kinematic(at));
-        let (parent, pose) = match kinematic {
-            Some(id) => (BodyId::Kinematic(id), Pose::identity()),
-            None => (BodyId::World, at),
+        let kinematic = is_kinematic.then(|| inner.world.add_kinematic(at));
+        let collider = match kinematic {
+            Some(id) => add(&mut inner.world, BodyId::Kinematic(id), Pose::identity()),
+            None => add(&mut inner.world, BodyId::World, at),
         };
-        let collider = world.add_shape(&spec.name, parent, pose, spec.shape.shape(), spec.friction);
         inner.refuse_overlap(lua, collider.into())?;
         Ok(LuaSolid { world: self.0.clone(), kinematic, collider })
     }
 
+    fn add_shape(&self, lua: &Lua, spec: &WorldSolidSpec, is_kinematic: bool) -> mlua::Result<LuaSolid> {
+        let WorldSolidSpec { name, shape, friction, position, axis_angle } = spec;
+        self.add_solid(
+            lua,
+            shape.bytes(),
+            pose(*position, *axis_angle),
+            is_kinematic,
+            |world, parent, pose| world.add_shape(name, parent, pose, shape.shape(), *friction),
+        )
+    }
+
     fn add_gel_pad(&self, lua: &Lua, spec: &WorldGelPadSpec) -> mlua::Result<LuaSolid> {
-        let surface = Arc::new(PadSurface::default());
         let law = PadSpec::default();
         let friction = Friction::new(law.static_mu, law.dynamic_mu);
         let stiffness = SurfaceStiffness { normal: law.normal_modulus, shear: law.tangential_modulus };
-        let reserved = reserve_in_world(lua, BYTES_PER_SOLID)?;
-        let mut inner = lock(&self.0);
-        inner.reserved.push(reserved);
-        let world = &mut inner.world;
-        let carrier = world.add_kinematic(pose(spec.position, spec.axis_angle));
-        let parent = BodyId::Kinematic(carrier);
-        let collider = Collider::new(&spec.name, parent, gel_pose_on_carrier(), surface, friction, stiffness);
-        let collider = world.add_collider(collider);
-        inner.refuse_overlap(lua, collider.into())?;
-        Ok(LuaSolid { world: self.0.clone(), kinematic: Some(carrier), collider })
+        self.add_solid(lua, 0, pose(spec.position, spec.axis_angle), true, |world, parent, _| {
+            let (surface, pose) = (Arc::new(PadSurface::default()), gel_pose_on_carrier());
+            world.add_collider(Collider::new(&spec.name, parent, pose, surface, friction, stiffness))
+        })
+    }
+
+    fn attach(
+        &self,
+        lua: &Lua,
+        body: &LuaBody,
+        region: &LuaShape,
+        to: &Holder,
+    ) -> mlua::Result<LuaAttachment> {
+        let (to, other) = match to {
+            Holder::World => (BodyId::World, None),
+            Holder::Solid(solid) => {
+                (solid.kinematic.map_or(BodyId::World, BodyId::Kinematic), Some(&solid.world))
+            }
+        };
+        for (key, world) in [("body", Some(&body.world)), ("to", other)] {
+            if world.is_some_and(|world| !Arc::ptr_eq(world, &self.0)) {
+                bail!(lua, "world:attach.{key}: expected an object of this world, got one of another");
+            }
+        }
+        let (mut inner, body) = (lock(&self.0), body.id);
+        let nodes = inner.world.soft(body).state.model.mesh.nodes.len();
+        inner.reserved.push(reserve_in_world(lua, BYTES_PER_NODE * nodes)?);
+        let attached = inner.world.attach(body, region.shape(), to);
+        let id = attached.map_err(|e| fail!(lua, "world:attach: {e}"))?;
+        Ok(LuaAttachment { world: self.0.clone(), id })
     }
 
     /// Makes one step; returns true, or false and the reason why the state of the world is invalid.
-    ///
-    /// # Errors
-    /// The state was invalid before.
     fn step(&self, lua: &Lua) -> mlua::Result<(bool, Option<String>)> {
         if cancel::requested() {
-            return Err(fail(lua, "interrupted"));
+            bail!(lua, "interrupted");
         }
         let inner = &mut *lock(&self.0);
         if let Some(failure) = &inner.failed {
-            return Err(fail(
-                lua,
-                format!("world:step: the world is invalid: {failure}; stop where world:step returns false"),
-            ));
+            bail!(lua, "world:step: the world is invalid: {failure}; stop where world:step returns false");
         }
         let _pause = inner.clock.pause();
         let Inner { world, timing, .. } = inner;
@@ -330,11 +375,11 @@ class! {
         methods {
             /// Adds a soft body. A body that overlaps another or a solid by more than 1 mm is an error.
             fn soft(lua, this) takes spec "softvt.WorldSoft" {
-                /// Name in messages.
+                /// Name of the body in messages.
                 name: String => Text("body");
-                /// Shape.
+                /// Shape of the body at rest.
                 shape: LuaShape;
-                /// Material.
+                /// Material of the body.
                 body: Constructed<SoftMaterial>;
                 /// Friction of its surface.
                 friction: Friction;
@@ -346,12 +391,22 @@ class! {
                 this.add_soft(lua, &name, &shape, &body, friction, pose(position, axis_angle))?
             }
             /// Adds a solid that solid:move_to moves.
-            fn kinematic(lua, this, spec: WorldSolidSpec) -> ["softvt.Solid"] { this.add_solid(lua, &spec, true)? }
+            fn kinematic(lua, this, spec: WorldSolidSpec) -> ["softvt.Solid"] { this.add_shape(lua, &spec, true)? }
             /// Adds a solid that never moves.
-            fn static(lua, this, spec: WorldSolidSpec) -> ["softvt.Solid"] { this.add_solid(lua, &spec, false)? }
+            fn static(lua, this, spec: WorldSolidSpec) -> ["softvt.Solid"] { this.add_shape(lua, &spec, false)? }
             /// Adds a gel pad of the robot, with the shape and the default contact law of its fingers, on a carrier
             /// that solid:move_to moves. Its frame is at the apex of the gel, which faces along x.
             fn gel_pad(lua, this, spec: WorldGelPadSpec) -> ["softvt.Solid"] { this.add_gel_pad(lua, &spec)? }
+            /// Holds a part of a soft body on a solid or in the world, where it is now. What moves the solid moves the
+            /// part. Where it is held, the body does not touch the solid.
+            fn attach(lua, this) takes spec "softvt.WorldAttach" {
+                /// The soft body.
+                body: LuaBody;
+                /// The part, in the frame of the shape of the body. It may be larger than the body.
+                region: LuaShape;
+                /// The solid that holds the part, or "world".
+                to: Holder;
+            } -> ["softvt.Attachment"] { this.attach(lua, &body, &region, &to)? }
             /// Makes one time step. Returns false and the reason if the state is invalid then; a further
             /// step is an error.
             fn step(lua, this) -> ["boolean", "string?"] { this.step(lua)? }
@@ -374,7 +429,6 @@ class! {
     }
 }
 
-/// `softvt.Body`.
 #[derive(Clone)]
 pub(crate) struct LuaBody {
     world: SharedWorld,
@@ -388,12 +442,12 @@ impl LuaBody {
 
     fn strain<T>(&self, read: impl FnOnce(&StrainMeter, &FemState) -> T) -> T {
         let inner = lock(&self.world);
-        read(&inner.strains[self.id.index()], &inner.world.soft(self.id).state)
+        read(&inner.bodies[self.id.index()].strain, &inner.world.soft(self.id).state)
     }
 
     fn contact(&self, lua: &Lua, method: &str, solid: &LuaSolid) -> mlua::Result<ContactSummary> {
         if !Arc::ptr_eq(&solid.world, &self.world) {
-            return Err(fail(lua, format!("body:{method}: solid: expected a solid of the body's own world")));
+            bail!(lua, "body:{method}: solid: expected a solid of the body's own world");
         }
         Ok(lock(&self.world).world.contact(self.id, solid.collider))
     }
@@ -401,12 +455,11 @@ impl LuaBody {
     fn deformation(&self, lua: &Lua) -> mlua::Result<Deformation> {
         let inner = lock(&self.world);
         let nodes = &inner.world.soft(self.id).state.x;
-        let deformation = inner.references[self.id.index()].measure(nodes);
-        deformation.map_err(|e| fail(lua, format!("body:deformation: {e}")))
+        let deformation = inner.bodies[self.id.index()].reference.measure(nodes);
+        deformation.map_err(|e| fail!(lua, "body:deformation: {e}"))
     }
 }
 
-/// A vector as a plain list.
 fn list(lua: &Lua, vector: &Vec3) -> mlua::Result<mlua::Table> {
     lua.create_sequence_from(vector.iter().copied())
 }
@@ -446,17 +499,16 @@ class! {
             fn deformation(lua, this) -> ["softvt.Deformation"] { deformation_table(lua, &this.deformation(lua)?)? }
             /// Returns the strain up to which its material is stable and undamaged: the smaller of collapse_strain and
             /// damage_strain; nil if it states none.
-            fn stable_strain(_, this) -> ["number?"] { lock(&this.world).stable_strains[this.id.index()] }
+            fn stable_strain(_, this) -> ["number?"] { lock(&this.world).bodies[this.id.index()].stable_strain }
             /// Returns the compressive strain that `percent` of the volume stays below: 1 − σ_min(F) at the Gauss
             /// points, weighted by volume. 95 is usual; a number between 0 and 1 is most likely a share, and an error.
             fn strain_percentile(lua, this, percent: f64 = PERCENT) -> ["number"] {
                 if percent > 0.0 && percent < 1.0 {
                     let (given, meant) = (format_number(percent), significant(100.0 * percent, 6));
-                    let message = format!("body:strain_percentile: expected percent, got {given}; did you mean {meant}?");
-                    return Err(fail(lua, message));
+                    bail!(lua, "body:strain_percentile: expected percent, got {given}; did you mean {meant}?");
                 }
                 let strain = this.strain(|meter, state| meter.percentile(state, 1.0 - percent / 100.0));
-                finite(strain).ok_or_else(|| fail(lua, "body:strain_percentile: the body has no finite strain"))?
+                finite(strain).ok_or_else(|| fail!(lua, "body:strain_percentile: the body has no finite strain"))?
             }
             /// Returns the share of the volume, %, with a compressive strain above `strain`.
             fn volume_beyond_pct(_, this, strain: f64 = STRAIN) -> ["number"] {
@@ -465,7 +517,7 @@ class! {
             /// Returns how the body lies if it has tilted by 5° or more from its modelled shape, else nil.
             fn lying(lua, this) -> ["softvt.Lying?"] {
                 let inner = lock(&this.world);
-                let (state, shape) = (&inner.world.soft(this.id).state, &inner.shapes[this.id.index()]);
+                let (state, shape) = (&inner.world.soft(this.id).state, &inner.bodies[this.id.index()].shape);
                 let (pose, _pause) = (state.mean_pose(), inner.clock.pause());
                 let settled = SettledBox::new(shape, &pose, Some(state));
                 settled.map(|settled| lying_table(lua, &(pose * settled.frame_o), &settled)).transpose()?
@@ -482,7 +534,7 @@ class! {
                 } else {
                     ReferenceShape::new(&body.x, mass).map(|shape| shape.along(&body.frame))
                 };
-                inner.references[this.id.index()] = reference.map_err(|e| fail(lua, e.to_string()))?;
+                inner.bodies[this.id.index()].reference = reference.map_err(|e| fail(lua, e.to_string()))?;
             }
             /// Returns the normal force of a solid on the body, N.
             fn force(lua, this, solid: LuaSolid) -> ["number"] { this.contact(lua, "force", &solid)?.normal_force }
@@ -499,7 +551,25 @@ class! {
     }
 }
 
-/// `softvt.Solid`.
+#[derive(Clone)]
+pub(crate) struct LuaAttachment {
+    world: SharedWorld,
+    id: AttachmentId,
+}
+
+class! {
+    /// A part of a soft body that a solid or the world holds.
+    LuaAttachment: "softvt.Attachment" {
+        label(_) { "attachment".to_owned() }
+        methods {
+            /// Returns the force that holds the body, N, in the world frame.
+            fn force(lua, this) -> ["number[]"] { list(lua, &lock(&this.world).world.attachment(this.id).force_w)? }
+            /// Returns the number of nodes that are held.
+            fn nodes(_, this) -> ["integer"] { lock(&this.world).world.attachment(this.id).nodes().count() }
+        }
+    }
+}
+
 #[derive(Clone)]
 pub(crate) struct LuaSolid {
     world: SharedWorld,
@@ -516,8 +586,7 @@ class! {
             /// default).
             fn move_to(lua, this, position: [f64; 3] = POSITION, axis_angle: Option<[f64; 3]> = AXIS_ANGLE) -> [] {
                 let Some(id) = this.kinematic else {
-                    let message = "solid:move_to: a static solid cannot move; make it with world:kinematic";
-                    return Err(fail(lua, message));
+                    bail!(lua, "solid:move_to: a static solid cannot move; make it with world:kinematic");
                 };
                 lock(&this.world).world.move_kinematic(id, pose(position, axis_angle));
             }

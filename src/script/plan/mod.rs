@@ -23,10 +23,10 @@ use crate::{
         simulation::settings,
         tasks::{ConditionSpec, ConditionsSpec, ExperimentSpec, SuiteSpec, TaskSpec},
     },
-    schema::{Constructed, FromChecked, Record, RecordType, UnusualNumbers, is_constructed, strict_table},
+    schema::{Constructed, LuaType, Record, RecordType, UnusualNumbers, is_constructed, strict_table},
     vm::{
         Vm, VmLimits,
-        error::{ScriptError, fail, fail_at},
+        error::{ScriptError, fail_at},
         json::to_json,
         library::{Library, ScriptFiles},
         source_map::{fail_at_key, origin_of_key},
@@ -45,45 +45,46 @@ use softvt_common::{
 };
 use softvt_rollout::AssetCache;
 
-/// Kind of the main file of a script.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum ScriptKind {
-    /// A plan or a profile.
-    Plan,
-    /// A policy, whose access to limits and materials depends on what it declares.
-    Policy,
-}
-
 /// The files of a script and the command line that they ran with: enough to run it again without the disk.
 #[derive(Clone, Debug)]
 pub struct ScriptSources {
-    kind: ScriptKind,
-    /// The main file, as messages name it.
+    /// True for a policy, whose access to limits and materials depends on its declaration.
+    is_policy: bool,
     pub main: String,
-    /// Every file that was read.
     pub bundle: Arc<ScriptFiles>,
     argv: Vec<String>,
     limits: VmLimits,
-    /// What is derived from the shapes and assets that they make.
+    /// Results derived from the shapes and assets that they make.
     pub assets: AssetCache,
 }
 
 impl ScriptSources {
+    fn new(main: &str, bundle: ScriptFiles, argv: &[String], limits: &VmLimits) -> Self {
+        Self {
+            is_policy: false,
+            main: main.to_owned(),
+            bundle: Arc::new(bundle),
+            argv: argv.to_vec(),
+            limits: limits.clone(),
+            assets: AssetCache::default(),
+        }
+    }
+
     /// Runs the main file at `path` and converts its result. The bundle holds the files that both have read: a result
     /// may contain functions that read further ones.
     fn read<T>(
-        kind: ScriptKind,
+        is_policy: bool,
         path: &Path,
         argv: &[String],
         limits: &VmLimits,
-        convert: impl FnOnce(&ScriptInstance) -> Result<T, ScriptError>,
+        convert: impl FnOnce(&ScriptInstance) -> mlua::Result<T>,
     ) -> Result<(Self, T), ScriptError> {
         let (library, main) = Library::open(path)?;
-        let assets = AssetCache::default();
-        let instance = ScriptInstance::open(kind, &main, library, argv, limits, &assets, |_| ())?;
-        let result = convert(&instance)?;
-        let bundle = Arc::new(lock(&instance.vm.library).bundle.clone());
-        Ok((Self { kind, main, bundle, argv: argv.to_vec(), limits: limits.clone(), assets }, result))
+        let mut sources = Self { is_policy, ..Self::new(&main, ScriptFiles::default(), argv, limits) };
+        let instance = sources.open(library, |_| ())?;
+        let result = convert(&instance).map_err(|e| instance.vm.explain(&e))?;
+        sources.bundle = Arc::new(lock(&instance.vm.library).bundle.clone());
+        Ok((sources, result))
     }
 
     /// Runs the main file again in a new virtual machine.
@@ -93,8 +94,28 @@ impl ScriptSources {
 
     /// As [`ScriptSources::instance`], with a virtual machine that `prepare` has changed before the main file runs.
     pub(crate) fn instance_with(&self, prepare: impl FnOnce(&Lua)) -> Result<ScriptInstance, ScriptError> {
-        let library = Library::frozen((*self.bundle).clone());
-        ScriptInstance::open(self.kind, &self.main, library, &self.argv, &self.limits, &self.assets, prepare)
+        self.open(Library::frozen((*self.bundle).clone()), prepare)
+    }
+
+    /// A virtual machine with the whole Lua interface, in which the main file has not run yet.
+    fn machine(&self, library: Library) -> Result<ScriptInstance, ScriptError> {
+        let vm = Vm::new(&self.main, library, &self.limits)?;
+        vm.lua.set_app_data(self.assets.clone());
+        let options = OptionSession::new(&self.argv);
+        install(&vm, &options).map_err(|e| vm.explain(&e))?;
+        Ok(ScriptInstance { vm, options, result: None })
+    }
+
+    fn open(&self, library: Library, prepare: impl FnOnce(&Lua)) -> Result<ScriptInstance, ScriptError> {
+        let mut instance = self.machine(library)?;
+        prepare(&instance.vm.lua);
+        if self.is_policy {
+            instance.vm.privilege.expect_declaration();
+        }
+        instance.result = instance.vm.run_main()?;
+        instance.check_result_size().map_err(|e| instance.vm.explain(&e))?;
+        lock(&instance.options).check_all_consumed(&self.main)?;
+        Ok(instance)
     }
 }
 
@@ -103,9 +124,8 @@ impl ScriptSources {
 pub struct LoadedScript {
     /// The files; episodes run on these.
     pub sources: ScriptSources,
-    /// What the script returns: suites, conditions or an experiment.
+    /// Suites, conditions or an experiment.
     pub plan: Plan,
-    /// The declared options, with their values.
     pub options: Vec<OptionSpec>,
     /// Secret of a judged run, from which the draws of its episodes derive.
     pub secret: Option<SecretSeed>,
@@ -123,9 +143,6 @@ impl LoadedScript {
 
     /// Warnings about the script, with file and line: shapes that it makes and does not use, and numbers outside of
     /// their usual range. Runs the script again.
-    ///
-    /// # Errors
-    /// As [`load`].
     pub fn warnings(&self) -> Result<Vec<String>, ScriptError> {
         // The result of the script stays alive, since shapes that its functions hold are not unused.
         let instance = self.sources.instance()?;
@@ -157,14 +174,9 @@ pub fn load(path: &Path, argv: &[String]) -> Result<LoadedScript, ScriptError> {
 }
 
 /// [`load`] within other limits.
-///
-/// # Errors
-/// As [`load`].
 pub fn load_with(path: &Path, argv: &[String], limits: &VmLimits) -> Result<LoadedScript, ScriptError> {
-    let (sources, (options, plan)) = ScriptSources::read(ScriptKind::Plan, path, argv, limits, |instance| {
-        let options = lock(&instance.options).declared.clone();
-        Ok((options, instance.plan().map_err(|e| instance.vm.explain(&e))?))
-    })?;
+    let (sources, (options, plan)) =
+        ScriptSources::read(false, path, argv, limits, ScriptInstance::options_and_plan)?;
     Ok(LoadedScript { sources, plan, options, secret: None, variation_files: BTreeMap::new() })
 }
 
@@ -174,12 +186,9 @@ pub fn load_with(path: &Path, argv: &[String], limits: &VmLimits) -> Result<Load
 /// # Errors
 /// If a file is missing, the script fails, or its options or its plan are invalid.
 pub fn load_files(main: &str, files: ScriptFiles, argv: &[String]) -> Result<LoadedScript, ScriptError> {
-    let (limits, bundle) = (VmLimits::default(), Arc::new(files));
-    let (kind, main, argv) = (ScriptKind::Plan, main.to_owned(), argv.to_vec());
-    let sources = ScriptSources { kind, main, bundle, argv, limits, assets: AssetCache::default() };
+    let sources = ScriptSources::new(main, files, argv, &VmLimits::default());
     let instance = sources.instance()?;
-    let options = lock(&instance.options).declared.clone();
-    let plan = instance.plan().map_err(|e| instance.vm.explain(&e))?;
+    let (options, plan) = instance.options_and_plan().map_err(|e| instance.vm.explain(&e))?;
     Ok(LoadedScript { sources, plan, options, secret: None, variation_files: BTreeMap::new() })
 }
 
@@ -189,7 +198,8 @@ pub fn load_files(main: &str, files: ScriptFiles, argv: &[String]) -> Result<Loa
 /// If the file cannot be read or is not Lua.
 pub fn declared_options(path: &Path) -> Result<Vec<OptionSpec>, ScriptError> {
     let (library, main) = Library::open(path)?;
-    let instance = ScriptInstance::new(&main, library, &[], &VmLimits::default(), &AssetCache::default())?;
+    let sources = ScriptSources::new(&main, ScriptFiles::default(), &[], &VmLimits::default());
+    let instance = sources.machine(library)?;
     let outcome = instance.vm.run_main();
     let declared = lock(&instance.options).declared.clone();
     if declared.is_empty() { outcome.map(|_| declared) } else { Ok(declared) }
@@ -199,63 +209,25 @@ pub fn declared_options(path: &Path) -> Result<Vec<OptionSpec>, ScriptError> {
 pub(crate) struct ScriptInstance {
     pub vm: Vm,
     options: SharedOptions,
-    /// First result of the main file.
     result: Option<Value>,
 }
 
 impl ScriptInstance {
-    /// A virtual machine in which nothing has run yet.
-    fn new(
-        main: &str,
-        library: Library,
-        argv: &[String],
-        limits: &VmLimits,
-        assets: &AssetCache,
-    ) -> Result<Self, ScriptError> {
-        let vm = Vm::new(main, library, limits)?;
-        vm.lua.set_app_data(assets.clone());
-        let options = OptionSession::new(argv);
-        install(&vm, &options).map_err(|e| vm.explain(&e))?;
-        Ok(Self { vm, options, result: None })
-    }
-
-    fn open(
-        kind: ScriptKind,
-        main: &str,
-        library: Library,
-        argv: &[String],
-        limits: &VmLimits,
-        assets: &AssetCache,
-        prepare: impl FnOnce(&Lua),
-    ) -> Result<Self, ScriptError> {
-        let mut instance = Self::new(main, library, argv, limits, assets)?;
-        prepare(&instance.vm.lua);
-        if kind == ScriptKind::Policy {
-            instance.vm.privilege.expect_declaration();
-        }
-        instance.result = instance.vm.run_main()?;
-        instance.check_result_size().map_err(|e| instance.vm.explain(&e))?;
-        lock(&instance.options).check_all_consumed(main)?;
-        Ok(instance)
-    }
-
     /// Checks the size of the result before it is copied: tables and texts count each time that they are used.
     fn check_result_size(&self) -> mlua::Result<()> {
         let Some(Value::Table(result)) = &self.result else { return Ok(()) };
         let lua = &self.vm.lua;
         let mut size = ResultSize { left: MAX_RESULT_BYTES, path: Vec::new() };
-        match size.take_table(result)? {
-            true => Ok(()),
-            false => {
-                let limit = MAX_RESULT_BYTES >> 20;
-                let message = format!(
-                    "the script returns more than {limit} MiB of tables and texts, where each counts as often as it is used; \
-                     return fewer or shorter ones"
-                );
-                let place = size.path.iter().rev().find_map(|table| origin_of_key(lua, table, &[]));
-                Err(fail_at(lua, place, message))
-            }
+        if size.take_table(result)? {
+            return Ok(());
         }
+        let place = size.path.iter().rev().find_map(|table| origin_of_key(lua, table, &[]));
+        let limit = MAX_RESULT_BYTES >> 20;
+        let message = format!(
+            "the script returns more than {limit} MiB of tables and texts, where each counts as often as it is used; \
+             return fewer or shorter ones"
+        );
+        Err(fail_at(lua, place, message))
     }
 
     /// True if the main file returned the result of the constructor of `record`.
@@ -279,8 +251,13 @@ impl ScriptInstance {
     fn expected_result<T: RecordType>(&self, file: &str) -> mlua::Result<Constructed<T>> {
         self.result()?.ok_or_else(|| {
             let got = self.result.as_ref().map_or("nothing".to_owned(), describe_constructed);
-            fail(&self.vm.lua, format!("{file} returns {}{{…}}, got {got}", T::RECORD.kind))
+            fail!(&self.vm.lua, "{file} returns {}{{…}}, got {got}", T::RECORD.kind)
         })
+    }
+
+    fn options_and_plan(&self) -> mlua::Result<(Vec<OptionSpec>, Plan)> {
+        let options = lock(&self.options).declared.clone();
+        Ok((options, self.plan()?))
     }
 
     fn plan(&self) -> mlua::Result<Plan> {
@@ -288,10 +265,10 @@ impl ScriptInstance {
         for (record, role) in [(PolicySpec::RECORD, "policy"), (ProfileSpec::RECORD, "profile")] {
             if self.returned(record) {
                 let kind = record.kind;
-                let message = format!(
+                bail!(
+                    lua,
                     "returns {kind}{{…}}, which is not a plan; run a suite, and give this file as its {role}"
                 );
-                return Err(fail(lua, message));
             }
         }
         if let Some(spec) = self.result::<ExperimentSpec>()? {
@@ -303,13 +280,13 @@ impl ScriptInstance {
         let specs = self.suites()?.filter(|specs| !specs.is_empty()).ok_or_else(|| {
             let got = self.result.as_ref().map_or("nothing".to_owned(), describe);
             let plans = "softvt.suite{…}, softvt.experiment{…} or a list of suites";
-            fail(lua, format!("a script returns a plan ({plans}), got {got}"))
+            fail!(lua, "a script returns a plan ({plans}), got {got}")
         })?;
         if self.result::<ConditionsSpec>()?.is_none() {
             let mut names = BTreeSet::new();
             for spec in &specs {
                 if !names.insert(spec.name.as_str()) {
-                    let message = format!("two suites are named {:?}; rename one", spec.name);
+                    let message = format_args!("two suites are named {:?}; rename one", spec.name);
                     return Err(fail_at_key(lua, &spec.table, "name", message));
                 }
             }
@@ -343,27 +320,26 @@ impl ScriptInstance {
         match entries.iter().all(is_suite) {
             true => entries
                 .into_iter()
-                .map(|entry| FromChecked::from_checked(entry, &self.vm.lua))
+                .map(|entry| LuaType::from_checked(entry, &self.vm.lua))
                 .collect::<mlua::Result<_>>()
                 .map(Some),
             false => Ok(None),
         }
     }
 
-    /// The declarations of a suite and a task.
-    pub(crate) fn find_task(&self, name: &str, id: usize) -> Result<FoundTask, ScriptError> {
+    pub(crate) fn find_task(&self, name: &str, id: usize) -> mlua::Result<FoundTask> {
         let main = self.vm.main();
-        let suites = self.suites().map_err(|e| self.vm.explain(&e))?;
+        let suites = self.suites()?;
         let suites = suites.ok_or_else(|| ScriptError::new(main, "the script did not return a suite"))?;
-        let Some(suite) = suites.iter().find(|suite| suite.name == name) else {
+        let suite = suites.iter().find(|suite| suite.name == name).ok_or_else(|| {
             let names = suites.iter().map(|suite| suite.name.as_str());
-            return Err(ScriptError::new(main, unknown_name("suite", name, names)));
-        };
-        match suite.tasks.get(id) {
-            Some(task) => Ok(FoundTask { suite: suite.clone(), task: task.clone() }),
-            None => Err(ScriptError::new(main, format!("suite {name:?} has no task {id}"))
-                .hint(format!("its tasks are 0 to {}", suite.tasks.len().saturating_sub(1)))),
-        }
+            ScriptError::new(main, unknown_name("suite", name, names))
+        })?;
+        let task = suite.tasks.get(id).ok_or_else(|| {
+            ScriptError::new(main, format!("suite {name:?} has no task {id}"))
+                .hint(format!("its tasks are 0 to {}", suite.tasks.len().saturating_sub(1)))
+        })?;
+        Ok(FoundTask { suite: suite.clone(), task: task.clone() })
     }
 }
 
@@ -404,7 +380,6 @@ impl ResultSize {
     }
 }
 
-/// The declarations of a task and its suite.
 pub(crate) struct FoundTask {
     pub suite: Constructed<SuiteSpec>,
     pub task: Constructed<TaskSpec>,
@@ -421,7 +396,6 @@ fn install(vm: &Vm, options: &SharedOptions) -> mlua::Result<()> {
     strict_table(lua, "softvt", vm.api.clone(), names).map(|_| ())
 }
 
-/// The suite of a declaration.
 pub(crate) fn suite(lua: &Lua, spec: &Constructed<SuiteSpec>) -> mlua::Result<Suite> {
     let name = spec.name.clone();
     let budget = match spec.tasks_differ_in {
@@ -431,18 +405,17 @@ pub(crate) fn suite(lua: &Lua, spec: &Constructed<SuiteSpec>) -> mlua::Result<Su
     let mut tasks: Vec<Task> = Vec::new();
     let mut known = BTreeMap::new();
     for (id, task) in spec.tasks.iter().enumerate() {
-        let table = &task.table;
-        let task = self::task(lua, id, task, budget)?;
+        let plain = self::task(lua, id, task, budget)?;
         let words: Vec<_> = task.prompt.split_whitespace().map(str::to_owned).collect();
-        if let Some(twin) = known.insert((words, task.layout.clone()), id) {
+        if let Some(twin) = known.insert((words, plain.layout.clone()), id) {
             let message = format!(
-                "task.prompt: tasks {twin} and {id} of suite {name:?} are both {:?} in the layout {:?}; a policy could not \
-                 distinguish them",
-                task.prompt, task.layout
+                "tasks {twin} and {id} of suite {name:?} are both {:?} in the layout {:?}; a policy could not distinguish \
+                 them",
+                plain.prompt, plain.layout
             );
-            return Err(fail_at_key(lua, table, "prompt", message));
+            return Err(task.invalid(lua, "prompt", message));
         }
-        tasks.push(task);
+        tasks.push(plain);
     }
     let shifts = spec.shifts.iter().map(|shift| Shift {
         name: shift.name.clone(),
@@ -452,9 +425,9 @@ pub(crate) fn suite(lua: &Lua, spec: &Constructed<SuiteSpec>) -> mlua::Result<Su
         max: shift.max,
     });
     if let Some(vary) = spec.vary.as_ref().filter(|_| spec.object_type == ObjectType::Rigid) {
-        let message = format!("suite.vary: {}", variation_file::no_soft_objects(&name, &vary.name));
-        return Err(fail_at_key(lua, &spec.table, "vary", message));
+        return Err(spec.invalid(lua, "vary", variation_file::no_soft_objects(&name, &vary.name)));
     }
+    let settings_at = origin_of_key(lua, &spec.table, &["settings"]);
     Ok(Suite {
         name,
         object_type: spec.object_type,
@@ -463,14 +436,9 @@ pub(crate) fn suite(lua: &Lua, spec: &Constructed<SuiteSpec>) -> mlua::Result<Su
         episodes: spec.episodes,
         tasks,
         shifts: shifts.collect(),
-        vary: spec.vary.as_ref().map(|vary| vary.ranges()),
+        vary: spec.vary.as_deref().cloned(),
         metrics: spec.metrics.iter().map(|metric| metric.plain()).collect(),
-        settings: settings(
-            lua,
-            "suite.settings",
-            spec.settings.as_ref(),
-            origin_of_key(lua, &spec.table, &["settings"]),
-        )?,
+        settings: settings(lua, "suite.settings", spec.settings.as_ref(), settings_at)?,
         twin_of: twin_of(lua, spec)?,
         teacher: spec.teacher.unwrap_or_default(),
     })
@@ -479,32 +447,30 @@ pub(crate) fn suite(lua: &Lua, spec: &Constructed<SuiteSpec>) -> mlua::Result<Su
 /// The suite whose rigid twin this one is, which must say that its objects are rigid.
 fn twin_of(lua: &Lua, spec: &Constructed<SuiteSpec>) -> mlua::Result<Option<String>> {
     let Some(name) = &spec.twin_of else { return Ok(None) };
-    let message = match (spec.object_type, *name == spec.name) {
-        (ObjectType::Deformable, _) => "suite.twin_of: a rigid twin has object_type = \"rigid\"",
-        (_, true) => "suite.twin_of: is the suite itself; name the suite of soft objects",
-        _ => return Ok(Some(name.clone())),
-    };
-    Err(fail_at_key(lua, &spec.table, "twin_of", message.to_owned()))
+    match (spec.object_type, *name == spec.name) {
+        (ObjectType::Deformable, _) => {
+            Err(spec.invalid(lua, "twin_of", "a rigid twin has object_type = \"rigid\""))
+        }
+        (_, true) => Err(spec.invalid(lua, "twin_of", "is the suite itself; name the suite of soft objects")),
+        _ => Ok(Some(name.clone())),
+    }
 }
 
 fn task(lua: &Lua, id: usize, spec: &Constructed<TaskSpec>, budget: u32) -> mlua::Result<Task> {
     let (goal, predicates) = spec.goal.plain(lua)?;
     for DeclaredPredicate { goal, table, .. } in &predicates {
-        // Those of a stack differ.
+        // The objects of a stack differ.
         if let Some(target) = goal.target().filter(|target| Some(*target) == goal.object()) {
-            let message = format!(
-                "task.goal.target: is {target:?}, which is the object itself; name what it must reach"
-            );
-            return Err(fail_at_key(lua, table, "target", message));
+            let what = format!("is {target:?}, which is the object itself; name what it must reach");
+            return Err(fail_at_key(lua, table, "target", format_args!("task.goal.target: {what}")));
         }
     }
     if spec.prompt.contains(is_control) || spec.prompt.trim().is_empty() {
-        let message = format!("task.prompt: expected one line of text, got {:?}", spec.prompt);
-        return Err(fail_at_key(lua, &spec.table, "prompt", message));
+        let message = format!("expected one line of text, got {:?}", spec.prompt);
+        return Err(spec.invalid(lua, "prompt", message));
     }
     if let Some(conflict) = conflict(&goal) {
-        let message = format!("task.goal: can never be met: {conflict}");
-        return Err(fail_at_key(lua, &spec.table, "goal", message));
+        return Err(spec.invalid(lua, "goal", format_args!("can never be met: {conflict}")));
     }
     Ok(Task {
         id,
@@ -518,7 +484,6 @@ fn task(lua: &Lua, id: usize, spec: &Constructed<TaskSpec>, budget: u32) -> mlua
     })
 }
 
-/// A condition of the list `list`.
 fn condition(lua: &Lua, list: &Table, spec: &ConditionSpec) -> mlua::Result<Condition> {
     let shift =
         spec.shift.iter().map(|(name, value)| ShiftValue { name: name.clone(), value: *value }).collect();
@@ -536,8 +501,7 @@ fn condition(lua: &Lua, list: &Table, spec: &ConditionSpec) -> mlua::Result<Cond
     }
     // Ranges may depend on the settings of the suite and are checked with them.
     Settings::default().check_fields(&set).map_err(|error| {
-        let message = format!("condition {:?}: set: {error}", spec.name);
-        fail_at_key(lua, list, "conditions", message)
+        fail_at_key(lua, list, "conditions", format_args!("condition {:?}: set: {error}", spec.name))
     })?;
     Ok(Condition {
         name: spec.name.clone(),

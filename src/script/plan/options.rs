@@ -9,15 +9,13 @@ use mlua::{Lua, LuaSerdeExt, Value};
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    schema::{
-        FromChecked, LuaType, Range, RecordType, Type, Unchecked, error_at_key, functions, record,
-        strict_table,
-    },
+    schema::{LuaType, Range, RecordType, Type, Unchecked, error_at_key, functions, record, strict_table},
     vm::{
         error::{ScriptError, app_data, fail},
         value::{describe, sorted_pairs},
     },
 };
+use ScriptOptionValue::{Flag, Integer, Number, Numbers, Text, Texts};
 use softvt_common::{parallel::lock, text::suggest};
 
 record! {
@@ -29,9 +27,9 @@ record! {
         integer: bool => Boolean(false);
         /// Unit of a number.
         unit: String => Text("");
-        /// Lowest number.
+        /// Lowest number that is accepted.
         min: Option<f64>;
-        /// Highest number.
+        /// Highest number that is accepted.
         max: Option<f64>;
         /// The allowed strings; any by default.
         choices: Option<Vec<String>>;
@@ -46,17 +44,13 @@ record! {
     }
 }
 
-/// The value of an option.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(untagged)]
 pub enum ScriptOptionValue {
     /// A number in the option's unit.
     Number(f64),
-    /// A whole number.
     Integer(i64),
-    /// A string.
     Text(String),
-    /// On or off.
     Flag(bool),
     /// A list of numbers, `48,46`.
     Numbers(Vec<f64>),
@@ -64,20 +58,15 @@ pub enum ScriptOptionValue {
     Texts(Vec<String>),
 }
 
-/// An option that a script declares.
 #[derive(Clone, Debug, PartialEq)]
 pub struct OptionSpec {
     /// Its name in Lua, `gap_mm`; on the command line `--gap-mm`.
     pub name: String,
     /// Unit of a number, "" for none.
     pub unit: String,
-    /// Description for --help.
     pub help: String,
-    /// Value where none is given.
     pub default: ScriptOptionValue,
-    /// Value in this run.
     pub value: ScriptOptionValue,
-    /// Allowed numbers.
     pub range: Range,
     /// Allowed strings; any if empty.
     pub choices: Vec<String>,
@@ -88,26 +77,21 @@ pub struct OptionSpec {
 }
 
 impl OptionSpec {
-    /// `--gap-mm`.
     pub fn flag(&self) -> String {
         format!("--{}", self.name.replace('_', "-"))
     }
 
     /// The allowed values, for help and messages.
     pub fn expects(&self) -> String {
-        let unit = if self.unit.is_empty() { String::new() } else { format!(" ({})", self.unit) };
+        let number = |noun: &str| self.range.expected(noun, &self.unit);
         match &self.default {
-            ScriptOptionValue::Number(_) => format!("a number{}{unit}", self.range.describe()),
-            ScriptOptionValue::Integer(_) => format!("a whole number{}{unit}", self.range.describe()),
-            ScriptOptionValue::Text(_) | ScriptOptionValue::Texts(_) if !self.choices.is_empty() => {
-                format!("one of {}", self.choices.join(", "))
-            }
-            ScriptOptionValue::Text(_) => "a string".into(),
-            ScriptOptionValue::Flag(_) => "on or off".into(),
-            ScriptOptionValue::Numbers(_) => {
-                format!("numbers joined by commas{}{unit}", self.range.describe())
-            }
-            ScriptOptionValue::Texts(_) => "strings joined by commas".into(),
+            Number(_) => number("a number"),
+            Integer(_) => number("a whole number"),
+            Numbers(_) => number("numbers joined by commas"),
+            Text(_) | Texts(_) if !self.choices.is_empty() => format!("one of {}", self.choices.join(", ")),
+            Text(_) => "a string".into(),
+            Texts(_) => "strings joined by commas".into(),
+            Flag(_) => "on or off".into(),
         }
     }
 
@@ -120,30 +104,26 @@ impl OptionSpec {
         help.into_iter().chain(conditions).collect::<Vec<_>>().join(", ")
     }
 
-    /// Parses a value of the command line.
     fn parse(&self, text: &str) -> Option<ScriptOptionValue> {
         let number = |text: &str| text.trim().parse::<f64>().ok().filter(|n| self.range.contains(*n));
         let allowed = |text: &str| self.choices.is_empty() || self.choices.iter().any(|c| c == text);
         let entries = || text.split(',').map(str::trim);
         match &self.default {
-            ScriptOptionValue::Number(_) => number(text).map(ScriptOptionValue::Number),
-            ScriptOptionValue::Integer(_) => {
-                let integer = text.trim().parse::<i64>().ok().filter(|n| self.range.contains(*n as f64));
-                integer.map(ScriptOptionValue::Integer)
+            Number(_) => number(text).map(Number),
+            Integer(_) => {
+                text.trim().parse::<i64>().ok().filter(|n| self.range.contains(*n as f64)).map(Integer)
             }
-            ScriptOptionValue::Text(_) => allowed(text).then(|| ScriptOptionValue::Text(text.to_owned())),
-            ScriptOptionValue::Flag(_) => match text {
-                "on" | "true" | "yes" | "1" => Some(ScriptOptionValue::Flag(true)),
-                "off" | "false" | "no" | "0" => Some(ScriptOptionValue::Flag(false)),
+            Text(_) => allowed(text).then(|| Text(text.to_owned())),
+            Flag(_) => match text {
+                "on" | "true" | "yes" | "1" => Some(Flag(true)),
+                "off" | "false" | "no" | "0" => Some(Flag(false)),
                 _ => None,
             },
-            ScriptOptionValue::Numbers(_) => {
-                entries().map(number).collect::<Option<_>>().map(ScriptOptionValue::Numbers)
+            Numbers(_) => entries().map(number).collect::<Option<_>>().map(Numbers),
+            Texts(_) => {
+                let fit = entries().all(|entry| allowed(entry) && !entry.is_empty());
+                fit.then(|| Texts(entries().map(str::to_owned).collect()))
             }
-            ScriptOptionValue::Texts(_) if entries().all(|entry| allowed(entry) && !entry.is_empty()) => {
-                Some(ScriptOptionValue::Texts(entries().map(str::to_owned).collect()))
-            }
-            ScriptOptionValue::Texts(_) => None,
         }
     }
 }
@@ -156,25 +136,7 @@ pub(crate) struct OptionSession {
     /// Words of the command line; `None` for those that an option has consumed.
     arguments: Vec<Option<String>>,
     pub declared: Vec<OptionSpec>,
-    /// Names of the options that the command line sets.
     given: Vec<String>,
-}
-
-/// An argument is not a value of its option.
-#[derive(Debug, thiserror::Error)]
-enum ArgumentError {
-    #[error("option {flag}: expected {expected}, got nothing")]
-    Missing { flag: String, expected: String },
-    #[error("option {flag}: expected {expected}, got {text:?}")]
-    Invalid { flag: String, expected: String, text: String },
-    #[error("option {0} is given twice; give it once")]
-    Twice(String),
-    #[error("option {flag} does nothing with {other} {value}; leave it out, or give {other} {needed}")]
-    NoEffect { flag: String, other: String, value: ScriptOptionValue, needed: String },
-    #[error("options.{option}.only_with: {other} is not an option of the script")]
-    Undeclared { option: String, other: String },
-    #[error("options.{option}.only_with.{other}: expected {expected}, got {needed:?}")]
-    Impossible { option: String, other: String, expected: String, needed: String },
 }
 
 impl OptionSession {
@@ -201,37 +163,32 @@ impl OptionSession {
     }
 
     /// Fails if the command line sets an option that does nothing with the values of the others.
-    fn check_effects(&self) -> Result<(), ArgumentError> {
+    fn check_effects(&self) -> Result<(), String> {
         let needs =
             self.declared.iter().flat_map(|option| option.only_with.iter().map(move |need| (option, need)));
         for (option, (name, needed)) in needs {
-            let undeclared =
-                || ArgumentError::Undeclared { option: option.name.clone(), other: name.clone() };
-            let other = self.declared.iter().find(|other| other.name == *name).ok_or_else(undeclared)?;
-            let impossible = || ArgumentError::Impossible {
-                option: option.name.clone(),
-                other: name.clone(),
-                expected: other.expects(),
-                needed: needed.clone(),
+            let (place, flag) = (format!("options.{}.only_with", option.name), option.flag());
+            let Some(other) = self.declared.iter().find(|other| other.name == *name) else {
+                return Err(format!("{place}: {name} is not an option of the script"));
             };
-            let wanted = other.parse(needed).ok_or_else(impossible)?;
+            let Some(wanted) = other.parse(needed) else {
+                return Err(format!("{place}.{name}: expected {}, got {needed:?}", other.expects()));
+            };
             if !other.value.contains(&wanted) && self.given.contains(&option.name) {
-                return Err(ArgumentError::NoEffect {
-                    flag: option.flag(),
-                    other: other.flag(),
-                    value: other.value.clone(),
-                    needed: needed.clone(),
-                });
+                let (other, value) = (other.flag(), &other.value);
+                return Err(format!(
+                    "option {flag} does nothing with {other} {value}; leave it out, or give {other} {needed}"
+                ));
             }
         }
         Ok(())
     }
 
     /// Consumes the arguments that set `spec` and returns its value, if any.
-    fn consume(&mut self, spec: &OptionSpec) -> Result<Option<ScriptOptionValue>, ArgumentError> {
+    fn consume(&mut self, spec: &OptionSpec) -> Result<Option<ScriptOptionValue>, String> {
         let flag = spec.flag();
         let (underscored, negated) = (format!("--{}", spec.name), format!("--no-{}", &flag[2..]));
-        let is_flag = matches!(spec.default, ScriptOptionValue::Flag(_));
+        let is_flag = matches!(spec.default, Flag(_));
         let mut found = None;
         for at in 0..self.arguments.len() {
             let Some(word) = self.arguments[at].clone() else { continue };
@@ -253,13 +210,12 @@ impl OptionSession {
                     .and_then(Option::take)
                     .filter(|text| !text.starts_with("--")),
             };
-            let (flag, expected) = (flag.clone(), spec.expects());
-            let Some(text) = text else { return Err(ArgumentError::Missing { flag, expected }) };
-            let Some(value) = spec.parse(&text) else {
-                return Err(ArgumentError::Invalid { flag, expected, text });
-            };
+            let expected = spec.expects();
+            let text = text.ok_or_else(|| format!("option {flag}: expected {expected}, got nothing"))?;
+            let value = spec.parse(&text);
+            let value = value.ok_or_else(|| format!("option {flag}: expected {expected}, got {text:?}"))?;
             if found.replace(value).is_some() {
-                return Err(ArgumentError::Twice(flag));
+                return Err(format!("option {flag} is given twice; give it once"));
             }
         }
         Ok(found)
@@ -272,8 +228,7 @@ functions! {
         /// `local opt = softvt.options { gap_mm = { default = 40, unit = "mm", min = 1 } }`.
         fn options(lua, options: Unchecked = Type::Map(&Type::Nested(OptionRecord::RECORD))) -> ["table<string, any>"] {
             let Value::Table(table) = &options.0 else {
-                let message = format!("options: expected a table of options, got {}", describe(&options.0));
-                return Err(fail(lua, message));
+                bail!(lua, "options: expected a table of options, got {}", describe(&options.0));
             };
             let session = app_data::<SharedOptions>(lua)?;
             let values = lua.create_table()?;
@@ -286,7 +241,7 @@ functions! {
                 names.push(spec.name.clone());
                 lock(&session).declared.push(spec);
             }
-            lock(&session).check_effects().map_err(|error| fail(lua, error.to_string()))?;
+            lock(&session).check_effects().map_err(|error| fail(lua, error))?;
             strict_table(lua, "options", values, names)?
         }
     }
@@ -295,28 +250,24 @@ functions! {
 /// Reads the declaration of an option and its value on the command line.
 fn declare(lua: &Lua, session: &mut OptionSession, key: &Value, value: &Value) -> mlua::Result<OptionSpec> {
     let Value::String(name) = key else {
-        return Err(fail(lua, format!("options: expected names as keys, got {}", describe(key))));
+        bail!(lua, "options: expected names as keys, got {}", describe(key));
     };
     let name = name.to_string_lossy();
     let fits = |b: u8| b.is_ascii_lowercase() || b.is_ascii_digit() || b == b'_';
     if !name.starts_with(|c: char| c.is_ascii_lowercase()) || !name.bytes().all(fits) {
-        let message = format!(
-            "options: {}: a name begins with a letter and has lower-case letters, digits and underscores",
-            describe(key)
-        );
-        return Err(fail(lua, message));
+        bail!(lua, "options: {name:?}: expected a name of lower-case letters, digits and underscores");
     }
     let checked = OptionRecord::TYPE.check(lua, value);
     let checked = checked.map_err(|error| error_at_key(lua, "options", &error.inside(name.clone())))?;
     let record = OptionRecord::from_checked(checked, lua)?;
     let default = match record.default {
-        Value::Integer(n) if record.integer => Some(ScriptOptionValue::Integer(n)),
+        Value::Integer(n) if record.integer => Some(Integer(n)),
         Value::Integer(_) | Value::Number(_) if record.integer => None,
         default => lua.from_value(default).ok(),
     };
     let default = default.ok_or_else(|| {
         let expected = "a number, string, boolean or list of numbers or strings";
-        fail(lua, format!("options.{name}.default: expected {expected}"))
+        fail!(lua, "options.{name}.default: expected {expected}")
     })?;
     let mut spec = OptionSpec {
         unit: record.unit,
@@ -330,12 +281,12 @@ fn declare(lua: &Lua, session: &mut OptionSession, key: &Value, value: &Value) -
         name,
     };
     if spec.parse(&spec.default.to_string()).is_none() {
-        return Err(fail(lua, format!("options.{}.default: expected {}", spec.name, spec.expects())));
+        bail!(lua, "options.{}.default: expected {}", spec.name, spec.expects());
     }
     if session.declared.iter().any(|known| known.name == spec.name) {
-        return Err(fail(lua, format!("options.{}: the option is declared twice", spec.name)));
+        bail!(lua, "options.{}: the option is declared twice", spec.name);
     }
-    if let Some(value) = session.consume(&spec).map_err(|error| fail(lua, error.to_string()))? {
+    if let Some(value) = session.consume(&spec).map_err(|error| fail(lua, error))? {
         spec.value = value;
         session.given.push(spec.name.clone());
     }
@@ -349,8 +300,9 @@ fn needed_values(
     values: BTreeMap<String, Value>,
 ) -> mlua::Result<BTreeMap<String, String>> {
     let value = |(other, value): (String, Value)| {
-        let message = format!("options.{name}.only_with.{other}: expected a number, string or boolean");
-        let value: ScriptOptionValue = lua.from_value(value).map_err(|_| fail(lua, message))?;
+        let value: ScriptOptionValue = lua.from_value(value).map_err(|_| {
+            fail!(lua, "options.{name}.only_with.{other}: expected a number, string or boolean")
+        })?;
         Ok((other, value.to_string()))
     };
     values.into_iter().map(value).collect()

@@ -4,26 +4,19 @@ use std::collections::BTreeSet;
 
 use mlua::{Lua, Table, Value};
 
-use crate::{
-    api::tasks::ExperimentSpec,
-    schema::Constructed,
-    vm::{error::fail, value::describe},
-};
+use crate::{api::tasks::ExperimentSpec, schema::Constructed, vm::value::describe};
 use softvt_common::text::{is_misspelt, unknown_name};
 
-/// Points of the grid of an experiment.
 const MAX_POINTS: usize = 1_000_000;
 
-/// The points of an experiment.
 pub(crate) enum Points {
-    /// Those of its function, and the names of the fields of all of them.
+    /// Results of a function, and the names of all of their fields.
     Listed { points: Vec<Table>, names: Vec<String> },
     /// Every combination of the values of a grid, the last parameter first.
     Grid(Vec<(String, Vec<Value>)>),
 }
 
 impl Points {
-    /// Number of points.
     pub(crate) fn len(&self) -> usize {
         match self {
             Self::Listed { points, .. } => points.len(),
@@ -33,7 +26,6 @@ impl Points {
         }
     }
 
-    /// Names of the fields of the points.
     fn names(&self) -> Vec<String> {
         match self {
             Self::Listed { names, .. } => names.clone(),
@@ -89,17 +81,15 @@ pub(crate) fn points(lua: &Lua, spec: &Constructed<ExperimentSpec>) -> mlua::Res
         (Some(points), None) => {
             let list: Value = points.call(spec.options.clone())?;
             let Value::Table(list) = &list else {
-                let message =
-                    format!("experiment.points: expected a list of tables, got {}", describe(&list));
-                return Err(fail(lua, message));
+                bail!(lua, "experiment.points: expected a list of tables, got {}", describe(&list));
             };
             let points: Vec<Value> = list.clone().sequence_values().collect::<mlua::Result<_>>()?;
             match (points.is_empty(), points.iter().all(Value::is_table)) {
                 (true, _) => {
-                    Err(fail(lua, "experiment.points: expected a list of at least one table, got none"))
+                    Err(fail!(lua, "experiment.points: expected a list of at least one table, got none"))
                 }
                 (false, true) => Ok(listed(points)),
-                (false, false) => Err(fail(lua, "experiment.points: every point is a table")),
+                (false, false) => Err(fail!(lua, "experiment.points: every point is a table")),
             }
         }
         (None, Some(grid)) => {
@@ -107,11 +97,11 @@ pub(crate) fn points(lua: &Lua, spec: &Constructed<ExperimentSpec>) -> mlua::Res
                 grid.iter().rev().map(|(name, values)| (name.clone(), values.clone())).collect(),
             );
             if grid.len() > MAX_POINTS {
-                return Err(fail(lua, "experiment.grid: has more than a million points; give fewer values"));
+                bail!(lua, "experiment.grid: has more than a million points; give fewer values");
             }
             Ok(grid)
         }
-        _ => Err(fail(lua, "experiment: give either grid or points")),
+        _ => Err(fail!(lua, "experiment: give either grid or points")),
     }
 }
 
@@ -133,7 +123,7 @@ fn refuse_reads(
     let read = lua.create_function(move |lua, (_, key): (Table, Value)| match &key {
         Value::String(key) if refuses(&key.to_string_lossy()) => {
             let known = names.iter().map(String::as_str);
-            Err(fail(lua, format!("point: {}", unknown_name("key", &key.to_string_lossy(), known))))
+            Err(fail!(lua, "point: {}", unknown_name("key", &key.to_string_lossy(), known)))
         }
         _ => Ok(Value::Nil),
     })?;

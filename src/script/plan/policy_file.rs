@@ -4,19 +4,19 @@ use std::path::Path;
 
 use mlua::{Function, Table, Value};
 
-use super::{ScriptInstance, ScriptKind, ScriptSources};
+use super::{ScriptInstance, ScriptSources};
 use crate::{
     api::{
         observation::{LuaObservation, task_brief},
         policy::{ActionSpec, PolicySpec},
         pose::rotation_from_wxyz,
     },
-    schema::{Constructed, FromChecked, RecordType, ValidationError, check::check},
+    schema::{Constructed, LuaType, RecordType, ValidationError, check::Checker},
     vm::{
         VmLimits,
         error::ScriptError,
         list::plain,
-        source_map::{fail_at_key, origin_of_key},
+        source_map::origin_of_key,
         value::{describe, literal, number},
     },
 };
@@ -29,16 +29,12 @@ use softvt_policy::{
 };
 use softvt_robot::rotation;
 
-/// A loaded policy file.
 #[derive(Clone, Debug)]
 pub struct PolicyFile {
-    /// Name in results.
     pub name: String,
     /// Number of actions of a list that are executed, if the file sets it.
     pub replan: Option<usize>,
-    /// Grip code, if the file declares one.
     pub gripper: Option<GripCode>,
-    /// Observations of the policy.
     pub streams: SensorStreams,
     /// True if the policy observes the finger drives: the exact width and the commanded closure.
     pub drives: bool,
@@ -51,8 +47,6 @@ pub struct PolicyFile {
 }
 
 impl PolicyFile {
-    /// Reads the policy at `path`.
-    ///
     /// # Errors
     /// If the file cannot be read or does not return a valid policy; the message names file and line.
     pub fn load(path: &Path) -> Result<Self, ScriptError> {
@@ -60,16 +54,12 @@ impl PolicyFile {
     }
 
     /// [`PolicyFile::load`] within other limits.
-    ///
-    /// # Errors
-    /// As [`PolicyFile::load`].
     pub fn load_with(path: &Path, limits: &VmLimits) -> Result<Self, ScriptError> {
-        let (sources, (spec, observes_at)) =
-            ScriptSources::read(ScriptKind::Policy, path, &[], limits, |instance| {
-                let policy = instance.policy()?;
-                let observes_at = origin_of_key(&instance.vm.lua, &policy.table, &["observes", "cameras"]);
-                Ok((policy.spec, observes_at))
-            })?;
+        let (sources, (spec, observes_at)) = ScriptSources::read(true, path, &[], limits, |instance| {
+            let policy = instance.policy()?;
+            let observes_at = origin_of_key(&instance.vm.lua, &policy.table, &["observes", "cameras"]);
+            Ok((policy.spec, observes_at))
+        })?;
         let PolicySpec { name, observes, replan, gripper, privileged, .. } = spec;
         let observes_at = observes_at.map_or_else(|| sources.main.clone(), |line| line.to_string());
         let (streams, drives) = (observes.streams(), observes.drives);
@@ -83,9 +73,8 @@ impl PolicyFile {
     /// If the file fails, or declares something else than when it was loaded.
     pub fn start(&self, seed: &EpisodeSeed, gripper: Option<GripCode>) -> Result<LuaPolicy, ScriptError> {
         let instance = self.sources.instance()?;
-        let policy = instance.policy()?;
-        self.check_declaration(&instance, &policy)?;
-        let PolicySpec { act, reset, .. } = policy.spec;
+        let policy = instance.policy().and_then(|policy| self.check_declaration(&instance, policy));
+        let PolicySpec { act, reset, .. } = policy.map_err(|e| instance.vm.explain(&e))?;
         instance.vm.random.reseed(seed.stream(RandomStream::Policy));
         let gripper = gripper.or(self.gripper);
         Ok(LuaPolicy { file: self.clone(), instance, act, reset, gripper })
@@ -95,8 +84,8 @@ impl PolicyFile {
     fn check_declaration(
         &self,
         instance: &ScriptInstance,
-        again: &Constructed<PolicySpec>,
-    ) -> Result<(), ScriptError> {
+        again: Constructed<PolicySpec>,
+    ) -> mlua::Result<PolicySpec> {
         let changed = [
             ("name", again.name != self.name),
             ("privileged", again.privileged != self.privileged),
@@ -104,27 +93,23 @@ impl PolicyFile {
             ("replan", again.replan != self.replan),
             ("gripper", again.gripper != self.gripper),
         ];
-        let Some((key, _)) = changed.into_iter().find(|(_, is_changed)| *is_changed) else { return Ok(()) };
-        let message = format!(
-            "policy.{key}: the file gave another value when it was loaded; declare the same each time that the file runs"
-        );
-        let vm = &instance.vm;
-        Err(vm.explain(&fail_at_key(&vm.lua, &again.table, key, message)))
+        let Some((key, _)) = changed.into_iter().find(|(_, is_changed)| *is_changed) else {
+            return Ok(again.spec);
+        };
+        let what =
+            "the file gave another value when it was loaded; declare the same each time that the file runs";
+        Err(again.invalid(&instance.vm.lua, key, what))
     }
 }
 
 impl ScriptInstance {
-    fn policy(&self) -> Result<Constructed<PolicySpec>, ScriptError> {
-        let policy = self.expected_result::<PolicySpec>("a policy's file");
-        let policy = policy.and_then(|policy| {
-            self.vm.privilege.declare(policy.privileged)?;
-            Ok(policy)
-        });
-        policy.map_err(|e| self.vm.explain(&e))
+    fn policy(&self) -> mlua::Result<Constructed<PolicySpec>> {
+        let policy = self.expected_result::<PolicySpec>("a policy's file")?;
+        self.vm.privilege.declare(policy.privileged)?;
+        Ok(policy)
     }
 }
 
-/// A policy in Lua, in one episode.
 pub struct LuaPolicy {
     file: PolicyFile,
     instance: ScriptInstance,
@@ -199,8 +184,9 @@ impl LuaPolicy {
             let action = match table.raw_get(index).map_err(|e| self.malformed(&label, e))? {
                 Value::Table(entry) => self.action(&label, &entry)?,
                 other => {
-                    let message = format!("expected an action, got {}", describe(&other));
-                    return Err(self.malformed(&label, ValidationError::new(message)));
+                    return Err(
+                        self.malformed(&label, mismatch!("expected an action, got {}", describe(&other)))
+                    );
                 }
             };
             chunk.commands.push(action);
@@ -219,7 +205,10 @@ impl LuaPolicy {
 
     fn checked_action(&self, table: &Table) -> Result<ToolCommand, ValidationError> {
         let lua = &self.instance.vm.lua;
-        let spec = ActionSpec::from_checked(Value::Table(check(lua, ActionSpec::RECORD, table)?), lua)?;
+        let spec = ActionSpec::from_checked(
+            Value::Table(Checker::new(lua).record(ActionSpec::RECORD, table)?),
+            lua,
+        )?;
         let pose = |position: [f64; 3], axis_angle_b| ToolMotion::Pose {
             position_b: Vec3::from(position),
             axis_angle_b,
@@ -230,26 +219,25 @@ impl LuaPolicy {
             (None, Some(position), None, Some(wxyz)) => {
                 pose(position, rotation::axis_angle(&rotation_from_wxyz(wxyz).unwrap_or_default()))
             }
-            (None, Some(_), ..) => return Err(ValidationError::new("give either axis_angle or quaternion")),
+            (None, Some(_), ..) => return Err(mismatch!("give either axis_angle or quaternion")),
             (Some(_), ..) => {
-                let message =
-                    "joints has a position, axis_angle or quaternion beside it; give either joints or a pose";
-                return Err(ValidationError::new(message));
+                return Err(mismatch!("give either joints or a pose"));
             }
             (None, None, ..) => {
-                let message = "position: missing; give position with axis_angle or quaternion, or joints";
-                return Err(ValidationError::new(message));
+                return Err(mismatch!("give either joints or position"));
             }
         };
         let (code, value) = match (self.gripper, spec.closure, spec.force) {
             (None, Some(closure), None) => (GripCode::Continuous, closure),
             (None | Some(GripCode::Force), None, Some(force)) => (GripCode::Force, force),
             (Some(code), Some(closure), None) if code != GripCode::Force => (code, closure),
-            (None, ..) => return Err(ValidationError::new("give either closure or force")),
+            (None, ..) => return Err(mismatch!("give either closure or force")),
             (Some(code), ..) => {
                 let field = if code == GripCode::Force { "force" } else { "closure" };
-                let message = format!("the grip code of the policy is {:?}; give {field} alone", code.name());
-                return Err(ValidationError::new(message));
+                return Err(mismatch!(
+                    "the grip code of the policy is {:?}; give {field} alone",
+                    code.name()
+                ));
             }
         };
         let values = GripperValues { code, ..GripperValues::new(0.0, 1.0) };

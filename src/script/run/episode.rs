@@ -6,11 +6,11 @@ use mlua::{FromLua, Function, Lua, Value};
 
 use super::{
     expert::{ExpertController, ExpertGrip},
-    predicate::{ScriptMetric, ScriptPredicate},
+    predicate::SceneFunction,
 };
 use crate::{
     api::{
-        envelope::draw,
+        envelope::draw_presses,
         expert_input::SuiteInstances,
         goals::DeclaredPredicate,
         random::LuaRng,
@@ -34,10 +34,9 @@ use softvt_benchmark::{
 use softvt_common::episode_id::EpisodeId;
 use softvt_common::{
     parallel::lock,
-    range::RangeError,
     text::{AXIS_NAMES, format_number, unknown_name},
 };
-use softvt_geometry::{Aabb, Vec3};
+use softvt_geometry::Aabb;
 use softvt_robot::{gripper::MAX_WIDTH, panda};
 use softvt_rollout::{MeasuredMetric, StatePredicate};
 use softvt_scene::{CameraSettings, Scene, SceneVariation};
@@ -51,15 +50,12 @@ const ROUNDING: f64 = 1e-9;
 pub struct SceneChanges {
     /// Shifts by name and value, in the order in which they apply.
     pub shifts: Vec<ShiftValue>,
-    /// True if soft objects become rigid.
     pub rigid_twin: bool,
-    /// Size of all camera images.
     pub cameras: CameraSettings,
 }
 
 /// An episode as its script describes it: the scene that the layout builds, and the expert of the task.
 pub struct EpisodeSetup {
-    /// Initial scene.
     pub scene: Scene,
     /// The same without the shifts; deformation limits are those of its objects.
     pub nominal: Scene,
@@ -69,11 +65,8 @@ pub struct EpisodeSetup {
     pub prompt: String,
     /// The same without the shifts.
     pub nominal_prompt: String,
-    /// Functions that the goal asks for, in its order.
     pub predicates: Vec<Arc<dyn StatePredicate>>,
-    /// Metrics of the suite.
     pub metrics: Vec<MeasuredMetric>,
-    /// Source of its random streams.
     pub seed: EpisodeSeed,
     instance: Arc<ScriptInstance>,
     expert: Option<Function>,
@@ -124,30 +117,26 @@ impl EpisodeSetup {
 /// that one layout changes is seen by the next.
 pub struct SceneBuilder {
     instance: Arc<ScriptInstance>,
-    /// The suites of the plan, by name.
     suites: BTreeMap<String, Suite>,
     secret: Option<SecretSeed>,
 }
 
 impl SceneBuilder {
     /// Runs the sources of `loaded` in a new virtual machine.
-    ///
-    /// # Errors
-    /// If the script fails.
     pub fn open(loaded: &LoadedScript) -> Result<Self, ScriptError> {
         let suites = loaded.plan.suites().iter().map(|suite| (suite.name.clone(), suite.clone()));
         let instance = Arc::new(loaded.sources.instance()?);
         Ok(Self { instance, suites: suites.collect(), secret: loaded.secret.clone() })
     }
 
-    /// Builds the initial scene of an episode.
-    ///
-    /// # Errors
-    /// As [`EpisodeSetup::open`].
     pub fn build(&self, id: &EpisodeId, changes: &SceneChanges) -> Result<EpisodeSetup, ScriptError> {
+        self.try_build(id, changes).map_err(|e| self.instance.vm.explain(&e))
+    }
+
+    fn try_build(&self, id: &EpisodeId, changes: &SceneChanges) -> mlua::Result<EpisodeSetup> {
         let vm = &self.instance.vm;
         let FoundTask { suite, task } = self.instance.find_task(&id.suite, id.task)?;
-        self.check_suite(&suite).map_err(|e| vm.explain(&e))?;
+        self.check_suite(&suite)?;
         let ranges = self.suites.get(&id.suite).and_then(|suite| suite.vary.as_ref());
         // A twin has the initial states of the suite whose twin it is.
         let seed_id = EpisodeId { suite: suite.twin_of.as_ref().unwrap_or(&id.suite).clone(), ..id.clone() };
@@ -158,17 +147,17 @@ impl SceneBuilder {
         vm.call::<()>(&task.layout.build, (current.clone(), rng))?;
         check_materials(&lock(&current.scene))?;
         let varied = ranges.map(|ranges| vary(&vm.lua, &mut lock(&current.scene), ranges, &seed));
-        let variation = varied.transpose().map_err(|error| vm.explain(&error))?;
+        let variation = varied.transpose()?;
         let mut nominal = lock(&current.scene).clone();
-        let object = task.object_name(&vm.lua).map_err(|e| vm.explain(&e))?;
-        let (_, predicates) = task.goal.plain(&vm.lua).map_err(|e| vm.explain(&e))?;
+        let object = task.object_name(&vm.lua)?;
+        let (_, predicates) = task.goal.plain(&vm.lua)?;
         let nominal_prompt = self.episode_prompt(&suite, &task, &current, &seed)?;
         current = current.for_task(&object, &nominal_prompt);
         let shifts = suite.shifts.as_slice();
         for ShiftValue { name, value } in &changes.shifts {
             let Some(shift) = shifts.iter().find(|shift| shift.name == *name) else {
                 let names = shifts.iter().map(|shift| shift.name.as_str());
-                return Err(ScriptError::new(vm.main(), unknown_shift(name, names)));
+                return Err(ScriptError::new(vm.main(), unknown_shift(name, names)).into());
             };
             current = self.shifted(&shift.apply, current, *value, &seed)?;
         }
@@ -180,28 +169,22 @@ impl SceneBuilder {
         for scene in [&mut scene, &mut nominal] {
             changes.cameras.apply(&mut scene.cameras);
         }
-        check_names(&vm.lua, &task, &predicates, &scene, &nominal).map_err(|e| vm.explain(&e))?;
-        check_workspace(&scene)
-            .map_err(|what| vm.explain(&fail_at_key(&vm.lua, &task.layout.table, "build", what)))?;
+        check_names(&vm.lua, &task, &predicates, &scene, &nominal)?;
+        check_workspace(&scene).map_err(|what| fail_at_key(&vm.lua, &task.layout.table, "build", what))?;
         let largest = ranges.map_or(1.0, |ranges| ranges.size.max);
         check_width(&scene, &object, variation.as_ref(), largest)?;
         let (instance, expert) = (self.instance.clone(), task.expert.clone());
-        let ranges = ranges.cloned();
-        let instances = SuiteInstances::new(&vm.lua, &suite, ranges).map_err(|e| vm.explain(&e))?;
-        let instances = Arc::new(instances);
-        let predicate = |DeclaredPredicate { goal, function, .. }: DeclaredPredicate| {
-            let predicate =
-                ScriptPredicate { instance: instance.clone(), name: goal.describe(), function: function? };
-            Some(Arc::new(predicate) as Arc<dyn StatePredicate>)
+        let instances = Arc::new(SuiteInstances::new(&vm.lua, &suite, ranges.cloned())?);
+        let scene_function = |name: String, function: Function| {
+            Arc::new(SceneFunction { instance: self.instance.clone(), name, function })
         };
-        let predicates = predicates.into_iter().filter_map(predicate).collect();
+        let predicates = predicates.into_iter().filter_map(|DeclaredPredicate { goal, function, .. }| {
+            Some(scene_function(goal.describe(), function?) as Arc<dyn StatePredicate>)
+        });
+        let predicates = predicates.collect();
         let metrics = suite.metrics.iter().map(|spec| MeasuredMetric {
             metric: spec.plain(),
-            function: Arc::new(ScriptMetric {
-                instance: instance.clone(),
-                name: spec.name.clone(),
-                function: spec.of.clone(),
-            }),
+            function: scene_function(spec.name.clone(), spec.of.clone()),
         });
         let metrics = metrics.collect();
         Ok(EpisodeSetup {
@@ -228,12 +211,9 @@ impl SceneBuilder {
         if self.suites.get(&spec.name).is_some_and(is_same) {
             return Ok(());
         }
-        let message = format!(
-            "suite {:?} differs from that of the plan, which the same file gave before; return the same suite each time that \
-             the file runs",
-            spec.name
-        );
-        Err(fail_at_key(lua, &spec.table, "tasks", message))
+        let what = "differs from that of the plan, which the same file gave before; return the same suite each time that \
+                    the file runs";
+        Err(fail_at_key(lua, &spec.table, "tasks", format_args!("suite {:?} {what}", spec.name)))
     }
 
     /// The prompt of an episode of this initial scene: that of the task, or what its function returns.
@@ -243,21 +223,14 @@ impl SceneBuilder {
         task: &Constructed<TaskSpec>,
         current: &LuaScene,
         seed: &EpisodeSeed,
-    ) -> Result<String, ScriptError> {
+    ) -> mlua::Result<String> {
         let Some(function) = &task.episode_prompt else { return Ok(task.prompt.clone()) };
         let vm = &self.instance.vm;
-        let wrong = |what: String| {
-            vm.explain(&fail_at_key(
-                &vm.lua,
-                &task.table,
-                "episode_prompt",
-                format!("task.episode_prompt: {what}"),
-            ))
-        };
+        let wrong = |what: String| task.invalid(&vm.lua, "episode_prompt", what);
         let scene = lock(&current.scene).clone();
         let given = LuaScene::new(scene.clone());
         let rng = LuaRng::new(seed.clone(), RandomStream::Prompt);
-        // What shifts draw must not depend on whether a prompt was drawn.
+        // Draws of shifts must not depend on a drawn prompt.
         let before = vm.random.replace(seed.stream(RandomStream::Prompt));
         let prompt = vm.call::<Value>(function, (given.clone(), rng));
         vm.random.reseed(before);
@@ -268,14 +241,14 @@ impl SceneBuilder {
         }
         let checked =
             Type::Text.check(&vm.lua, &prompt).map_err(|error| wrong(error.describe("what it returned")))?;
-        let prompt = String::from_lua(checked, &vm.lua).map_err(|error| vm.explain(&error))?;
+        let prompt = String::from_lua(checked, &vm.lua)?;
         // Spaces of clients list the characters of prompts.
         let is_known =
             |c: char| (' '..='~').contains(&c) || suite.tasks.iter().any(|task| task.prompt.contains(c));
         match prompt.chars().find(|c| !is_known(*c)) {
             _ if prompt.trim().is_empty() => Err(wrong("returned a blank text".to_owned())),
             Some(c) => Err(wrong(format!(
-                "returned {prompt:?}, whose {c:?} is no printable character of ASCII, and in no prompt of the suite"
+                "returned {prompt:?}, whose {c:?} is neither ASCII nor in a prompt of the suite"
             ))),
             None => Ok(prompt),
         }
@@ -288,14 +261,11 @@ impl SceneBuilder {
         scene: LuaScene,
         value: f64,
         seed: &EpisodeSeed,
-    ) -> Result<LuaScene, ScriptError> {
+    ) -> mlua::Result<LuaScene> {
         let vm = &self.instance.vm;
-        let wrong = |expected: &str| {
-            vm.explain(&fail(&vm.lua, format!("shift.apply: expected {expected} to be returned")))
-        };
-        match &vm
-            .call::<Value>(apply, (scene.clone(), value, LuaRng::new(seed.clone(), RandomStream::Script)))?
-        {
+        let wrong = |expected| fail!(&vm.lua, "shift.apply: expected {expected} to be returned");
+        let rng = LuaRng::new(seed.clone(), RandomStream::Script);
+        match &vm.call::<Value>(apply, (scene.clone(), value, rng))? {
             Value::Nil => Ok(scene),
             Value::UserData(data) => match data.borrow::<LuaScene>() {
                 Ok(other) => Ok(other.clone()),
@@ -306,17 +276,13 @@ impl SceneBuilder {
     }
 }
 
-/// Draws and applies the variation of an episode.
-///
-/// # Errors
-/// The scene has nothing that the variation changes, or no instance can be drawn.
 fn vary(
     lua: &Lua,
     scene: &mut Scene,
     ranges: &VariationRanges,
     seed: &EpisodeSeed,
 ) -> mlua::Result<SceneVariation> {
-    let drawn = draw(lua, |presses_of| ranges.draw(seed, scene, presses_of))?;
+    let drawn = ranges.draw(seed, scene, &|asset| draw_presses(lua, asset));
     let subject = format!("layout {:?} of suite {:?}", seed.layout, seed.id.suite);
     let drawn = drawn.map_err(|error| {
         fail(lua, match error {
@@ -327,7 +293,7 @@ fn vary(
             _ => format!("{subject}: {error}"),
         })
     })?;
-    drawn.apply(scene).map_err(|error| fail(lua, format!("{subject}: {error}")))?;
+    drawn.apply(scene).map_err(|error| fail!(lua, "{subject}: {error}"))?;
     Ok(drawn)
 }
 
@@ -373,33 +339,20 @@ fn check_width(
     if width < MAX_WIDTH {
         return Ok(());
     }
+    let (width, most, scale) = (1e3 * width, 1e3 * MAX_WIDTH, format_number((1e6 * scale).round() / 1e6));
     let message = format!(
-        "object {name:?} is {:.1} mm wide where fingers grasp it, at {} times the size of {}, and the gripper opens {:.0} mm; \
-         give a smaller scale",
-        1e3 * width,
-        format_number((1e6 * scale).round() / 1e6),
-        object.nominal.name,
-        1e3 * MAX_WIDTH
+        "object {name:?} is {width:.1} mm wide where fingers grasp it, at a scale of {scale}, and the gripper opens {most:.0} mm"
     );
     Err(ScriptError::new(object.placed_at.as_str(), message))
 }
 
 /// Checks that the workspace is a box, and that the arm reaches it.
-///
-/// # Errors
-/// What is wrong with it.
 fn check_workspace(scene: &Scene) -> Result<(), String> {
     let Aabb { min, max } = scene.workspace;
-    let corner = |p: &Vec3| {
-        let [x, y, z] = [p.x, p.y, p.z].map(format_number);
-        format!("{{ {x}, {y}, {z} }}")
-    };
     if let Some(axis) = (0..3).find(|&i| min[i] >= max[i]) {
         return Err(format!(
-            "scene.workspace_min {} is not below scene.workspace_max {} along {}",
-            corner(&min),
-            corner(&max),
-            AXIS_NAMES[axis]
+            "scene.workspace_min is not below scene.workspace_max along {}, {} and {}",
+            AXIS_NAMES[axis], min[axis], max[axis]
         ));
     }
     let base = scene.base_w.translation.vector;
@@ -407,12 +360,9 @@ fn check_workspace(scene: &Scene) -> Result<(), String> {
     if distance <= panda::REACH {
         return Ok(());
     }
+    let (distance, reach) = (format_number((1e3 * distance).round() / 1e3), panda::REACH);
     Err(format!(
-        "scene.base {} is {} m from the workspace, and the arm reaches {} m; move the base, or \
-         scene.workspace_min and scene.workspace_max",
-        corner(&base),
-        format_number((1e3 * distance).round() / 1e3),
-        format_number(panda::REACH)
+        "scene.base is {distance} m from the workspace, and the arm reaches {reach} m; move one of them"
     ))
 }
 
@@ -424,28 +374,16 @@ fn unknown_shift<'a>(name: &str, known: impl Iterator<Item = &'a str> + Clone) -
     }
 }
 
-/// The value of a shift is invalid.
-#[allow(missing_docs)] // The messages say what the fields are.
-#[derive(Debug, PartialEq, Eq, thiserror::Error)]
-pub enum ShiftError {
-    /// The suite declares no shift of this name.
-    #[error("{}", unknown_shift(name, known.iter().map(String::as_str)))]
-    Unknown { name: String, known: Vec<String> },
-    /// The value is out of the declared range.
-    #[error("shift {0}")]
-    Value(#[from] RangeError),
-}
-
-/// Checks the value of a shift against those that a suite declares.
+/// Checks the value of a shift against those that a suite declares. The error is a fragment.
 ///
 /// # Errors
 /// If the shift is unknown or the value is out of its range; the message is a fragment.
-pub fn check_shift(shifts: &[Shift], name: &str, value: f64) -> Result<(), ShiftError> {
+pub fn check_shift(shifts: &[Shift], name: &str, value: f64) -> Result<(), String> {
     let Some(shift) = shifts.iter().find(|shift| shift.name == name) else {
-        let known = shifts.iter().map(|shift| shift.name.clone()).collect();
-        return Err(ShiftError::Unknown { name: name.to_owned(), known });
+        return Err(unknown_shift(name, shifts.iter().map(|shift| shift.name.as_str())));
     };
-    Ok(Range::between(shift.min, shift.max).check(name, value, &shift.unit)?)
+    let checked = Range::between(shift.min, shift.max).check(name, value, &shift.unit);
+    checked.map_err(|error| format!("shift {error}"))
 }
 
 /// Checks that a scene has the objects and joints that a task names, and that its goal can hold with the ranges of
@@ -467,16 +405,15 @@ fn check_names(
         for (field, found) in named {
             let Some(Err(what)) = found else { continue };
             let key = predicate.field(field);
-            return Err(fail_at_key(lua, table, key, format!("task.goal.{key}: {what}")));
+            return Err(fail_at_key(lua, table, key, format_args!("task.goal.{key}: {what}")));
         }
     }
     if let Some(Err(what)) = task.object.as_ref().map(|name| movable_object(scene, name)) {
-        return Err(fail_at_key(lua, &task.table, "object", format!("task.object: {what}")));
+        return Err(task.invalid(lua, "object", what));
     }
     let limits = |name: &str| scene_names::joint(scene, name).ok().map(|joint| [joint.lower, joint.upper]);
     if let Some(conflict) = conflict(&task.goal.plain(lua)?.0.with_joint_ranges(&limits)) {
-        let message = format!("task.goal: can never be met: {conflict}");
-        return Err(fail_at_key(lua, &task.table, "goal", message));
+        return Err(task.invalid(lua, "goal", format_args!("can never be met: {conflict}")));
     }
     task.expert.as_ref().map_or(Ok(()), |expert| check_expert(lua, expert, nominal))
 }

@@ -12,18 +12,13 @@ use crate::{
         tasks::{ExperimentSpec, FinishSpec},
     },
     plan::{LoadedScript, Points, ScriptInstance, points},
-    schema::{Constructed, FromChecked, RecordType, validate},
-    vm::{
-        error::{ScriptError, fail},
-        json::to_json,
-        value::describe,
-    },
+    schema::{Constructed, LuaType, RecordType, validate},
+    vm::{error::ScriptError, json::to_json, library::is_inside, value::describe},
 };
 use softvt_sensing::camera::encode_png;
 
 pub use softvt_runs::experiment_folder::ExperimentRow;
 
-/// Summary of an experiment.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct ExperimentSummary {
     /// Printed after the rows.
@@ -51,9 +46,6 @@ impl Experiment {
     }
 
     /// As [`Experiment::open`], with simulations that take the settings and seed of `input`.
-    ///
-    /// # Errors
-    /// As [`Experiment::open`].
     pub fn open_with(loaded: &LoadedScript, input: &Arc<ExperimentInput>) -> Result<Self, ScriptError> {
         let input = Arc::clone(input);
         let instance = loaded.sources.instance_with(|lua| {
@@ -70,12 +62,10 @@ impl Experiment {
         Ok(experiment)
     }
 
-    /// Number of points.
     pub fn len(&self) -> usize {
         self.points.len()
     }
 
-    /// True if the experiment has no points.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
@@ -155,35 +145,25 @@ fn read_summary(lua: &Lua, value: &Value) -> mlua::Result<ExperimentSummary> {
     let spec = FinishSpec::from_checked(Value::Table(validate(lua, FinishSpec::RECORD, value)?), lua)?;
     let (mut files, mut bytes) = (Vec::new(), 0);
     for (path, content) in spec.files {
-        let is_inside =
-            |part: &str| !part.is_empty() && part != "." && part != ".." && !part.contains(['\\', ':']);
-        if has_control(&path) {
-            return Err(fail(lua, format!("finish.files: {path:?} holds a control character; leave it out")));
+        if path.contains(char::is_control) {
+            bail!(lua, "finish.files: {path:?} holds a control character; leave it out");
         }
-        if !path.split('/').all(is_inside) {
-            let message = format!(
+        if !is_inside(&path) {
+            bail!(
+                lua,
                 "finish.files: {path:?} is no path within the folder; give one such as \"plots/d.svg\", without \"..\", \
                  \":\" and \"\\\", and no \"/\" at its beginning"
             );
-            return Err(fail(lua, message));
         }
         let content = file_content(lua, &content)?;
         bytes += content.len();
         if bytes > MAX_FILES_BYTES {
             let limit = MAX_FILES_BYTES >> 20;
-            return Err(fail(
-                lua,
-                format!("finish.files: take more than {limit} MiB; write fewer or smaller ones"),
-            ));
+            bail!(lua, "finish.files: take more than {limit} MiB; write fewer or smaller ones");
         }
         files.push((path, content));
     }
     Ok(ExperimentSummary { text: spec.text, files, problem: spec.problem })
-}
-
-/// True if a path would control a terminal, or span several lines.
-fn has_control(path: &str) -> bool {
-    path.contains(char::is_control)
 }
 
 /// The bytes of a file: text as it is, images as PNG, other data as JSON.
@@ -212,11 +192,9 @@ fn rows(lua: &Lua, result: &Value, input: &ExperimentInput) -> mlua::Result<Vec<
             let bytes = text_bytes(&map);
             let too_much = |what: &str, limit: usize| {
                 let limit = limit >> 20;
-                Err(fail(
+                Err(fail!(
                     lua,
-                    format!(
-                        "experiment.run: {what} more than {limit} MiB of text; return long texts as finish.files"
-                    ),
+                    "experiment.run: {what} more than {limit} MiB of text; return long texts as finish.files"
                 ))
             };
             if bytes > MAX_ROW_TEXT {
@@ -227,11 +205,7 @@ fn rows(lua: &Lua, result: &Value, input: &ExperimentInput) -> mlua::Result<Vec<
             }
             Ok(map)
         }
-        _ => {
-            let message =
-                format!("experiment.run: expected a row or a list of rows, got {}", describe(value));
-            Err(fail(lua, message))
-        }
+        _ => Err(fail!(lua, "experiment.run: expected a row or a list of rows, got {}", describe(value))),
     };
     match result {
         Value::Table(table) if table.raw_len() > 0 => {

@@ -5,7 +5,7 @@ use std::{collections::BTreeMap, sync::Arc};
 use crate::{
     api::{
         expert::{Coroutine, FingerAccess},
-        expert_input::{ExpertInput, SuiteInstances, TrackingErrorMonitor},
+        expert_input::{SuiteInstances, TrackingErrorMonitor, expert_view},
     },
     plan::ScriptInstance,
     vm::error::ScriptError,
@@ -14,14 +14,11 @@ use softvt_policy::{Action, Observation, PolicyError, SensorStreams};
 use softvt_robot::rotation;
 use softvt_rollout::{Controller, Simulation};
 
-/// Gripper control of the scripted experts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ExpertGrip {
-    /// The closure that the expert commands.
     Commanded,
-    /// Either open or closed.
     Binary,
-    /// That of a controller that does not know the instance, if the expert has one of its name.
+    /// The grip of a controller that does not know the instance, if the expert has one of its name.
     Blind(BlindGrip),
     /// Feels with the tactile sensors how firmly the object must be held, wherever the expert grasps.
     TactileServo,
@@ -31,15 +28,11 @@ pub enum ExpertGrip {
 /// instance itself. Experts implement them in Lua.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum BlindGrip {
-    /// One closure per asset.
     FixedClosure,
-    /// A closure per asset and size.
     SizeSeen,
     /// An indentation after first contact.
     ContactDepth,
-    /// A grip force per asset.
     OneForce,
-    /// One grip force for all assets of a suite.
     OneForceForAll,
     /// The width and the force that the drives of the fingers measure.
     Drives,
@@ -50,7 +43,6 @@ pub enum BlindGrip {
 }
 
 impl BlindGrip {
-    /// Name, as experts read it.
     pub fn name(self) -> &'static str {
         match self {
             Self::FixedClosure => "fixed-closure",
@@ -130,14 +122,14 @@ impl Controller for ExpertController {
     fn act(&mut self, sim: &Simulation, observation: &Observation) -> Result<Option<Action>, PolicyError> {
         let tactile = observation.tactile.as_ref().and_then(|tactile| tactile.frames.last());
         self.coroutine.set_readings(tactile.cloned());
-        let mut input = ExpertInput::new(sim, observation.time_s, &mut self.monitor);
+        let (mut view, complaint) = (expert_view(sim, observation.time_s), self.monitor.complaint(sim));
         if let ExpertGrip::Blind(controller) = self.mode {
-            input.view.grip_controller = Some(controller.name());
-            input.view.instances = Some(self.instances.clone());
+            view.grip_controller = Some(controller.name());
+            view.instances = Some(self.instances.clone());
         }
         let vm = &self.instance.vm;
         let _deadline = vm.call_deadline();
-        let command = self.coroutine.next_command(&vm.lua, input, &mut self.monitor);
+        let command = self.coroutine.next_command(&vm.lua, &view, complaint, &mut self.monitor);
         let command = command.map_err(|error| PolicyError::Script(vm.explain(&error).to_string()))?;
         Ok(command.map(|command| {
             self.is_gripping = command.gripping;

@@ -1,40 +1,34 @@
 //! Conversion of checked Lua values to Rust types, and the declaration of records.
 
-use std::{collections::BTreeMap, ops::Deref};
+use std::{collections::BTreeMap, fmt::Display, ops::Deref};
 
 use mlua::{Function, Lua, Table, Value};
 
-use super::{ApiObject, FieldDefault, Range, Record, Type, check::check};
-use crate::vm::{error::fail, value::describe};
+use super::{ApiObject, FieldDefault, Range, Record, Type, check::Checker};
+use crate::vm::{source_map::fail_at_key, value::describe};
 use softvt_geometry::Vec3;
 
-/// Conversion of a checked Lua value. Unlike [`mlua::FromLua`], it can be implemented for types of other crates.
-pub(crate) trait FromChecked: Sized {
-    fn from_checked(value: Value, lua: &Lua) -> mlua::Result<Self>;
-}
-
-/// A Rust type that checked Lua values convert to.
-pub(crate) trait LuaType: FromChecked {
+/// A Rust type, perhaps of another crate, that checked Lua values convert to.
+pub(crate) trait LuaType: Sized {
     /// The Lua type, where a declaration gives no narrower one.
     const TYPE: Type;
     /// The same, for lists and maps of it.
     const REFERENCE: &'static Type = &Self::TYPE;
-    /// The value where none is given.
     const PRESENCE: FieldDefault = FieldDefault::Required;
     /// False if a parameter of this type reaches the function as the script gave it.
     const CHECKED: bool = true;
+
+    fn from_checked(value: Value, lua: &Lua) -> mlua::Result<Self>;
 }
 
 macro_rules! lua_types {
-    ($($rust:ty => $ty:expr),+ $(,)?) => {$(
-        impl FromChecked for $rust {
+    ($($rust:ty => $ty:expr $(; [$($generic:tt)+])?),+ $(,)?) => {$(
+        impl $(<$($generic)+>)? LuaType for $rust {
+            const TYPE: Type = $ty;
+
             fn from_checked(value: Value, lua: &Lua) -> mlua::Result<Self> {
                 lua.unpack(value)
             }
-        }
-
-        impl LuaType for $rust {
-            const TYPE: Type = $ty;
         }
     )+};
 }
@@ -54,56 +48,38 @@ lua_types! {
     Function => Type::Function("fun()"),
     Table => Type::Table("table"),
     Value => Type::Any,
+    [f64; N] => Type::vector(N, ""); [const N: usize],
+    T => Type::Object(T::NAME); [T: ApiObject],
 }
 
-impl FromChecked for Vec3 {
+impl LuaType for Vec3 {
+    const TYPE: Type = Type::vector(3, "");
+
     fn from_checked(value: Value, lua: &Lua) -> mlua::Result<Self> {
         lua.unpack::<[f64; 3]>(value).map(Self::from)
-    }
-}
-
-impl<const N: usize> FromChecked for [f64; N] {
-    fn from_checked(value: Value, lua: &Lua) -> mlua::Result<Self> {
-        lua.unpack(value)
-    }
-}
-
-impl<const N: usize> LuaType for [f64; N] {
-    const TYPE: Type = Type::vector(N, "");
-}
-
-impl<T: ApiObject> FromChecked for T {
-    fn from_checked(value: Value, lua: &Lua) -> mlua::Result<Self> {
-        lua.unpack(value)
-    }
-}
-
-impl<T: ApiObject> LuaType for T {
-    const TYPE: Type = Type::Object(T::NAME);
-}
-
-impl<T: FromChecked> FromChecked for Option<T> {
-    fn from_checked(value: Value, lua: &Lua) -> mlua::Result<Self> {
-        if value.is_nil() { Ok(None) } else { T::from_checked(value, lua).map(Some) }
     }
 }
 
 impl<T: LuaType> LuaType for Option<T> {
     const TYPE: Type = T::TYPE;
     const PRESENCE: FieldDefault = FieldDefault::Optional;
-}
 
-impl<T: FromChecked> FromChecked for Vec<T> {
     fn from_checked(value: Value, lua: &Lua) -> mlua::Result<Self> {
-        lua.unpack::<Table>(value)?.sequence_values().map(|item| T::from_checked(item?, lua)).collect()
+        if value.is_nil() { Ok(None) } else { T::from_checked(value, lua).map(Some) }
     }
 }
 
 impl<T: LuaType> LuaType for Vec<T> {
     const TYPE: Type = Type::List(T::REFERENCE);
+
+    fn from_checked(value: Value, lua: &Lua) -> mlua::Result<Self> {
+        lua.unpack::<Table>(value)?.sequence_values().map(|item| T::from_checked(item?, lua)).collect()
+    }
 }
 
-impl<T: FromChecked> FromChecked for BTreeMap<String, T> {
+impl<T: LuaType> LuaType for BTreeMap<String, T> {
+    const TYPE: Type = Type::Map(T::REFERENCE);
+
     fn from_checked(value: Value, lua: &Lua) -> mlua::Result<Self> {
         let entry = |pair: mlua::Result<(String, Value)>| {
             let (key, value) = pair?;
@@ -113,26 +89,20 @@ impl<T: FromChecked> FromChecked for BTreeMap<String, T> {
     }
 }
 
-impl<T: LuaType> LuaType for BTreeMap<String, T> {
-    const TYPE: Type = Type::Map(T::REFERENCE);
-}
-
 /// An argument that the function checks itself.
 pub(crate) struct Unchecked(pub Value);
 
-impl FromChecked for Unchecked {
+impl LuaType for Unchecked {
+    const TYPE: Type = Type::Any;
+    const CHECKED: bool = false;
+
     fn from_checked(value: Value, _: &Lua) -> mlua::Result<Self> {
         Ok(Self(value))
     }
 }
 
-impl LuaType for Unchecked {
-    const TYPE: Type = Type::Any;
-    const CHECKED: bool = false;
-}
-
 /// A struct with a [`Record`], declared by [`record!`] or [`record_of!`].
-pub(crate) trait RecordType: FromChecked {
+pub(crate) trait RecordType: LuaType {
     const RECORD: &'static Record;
     const RECORDS: &'static [&'static Record] = &[Self::RECORD];
 }
@@ -145,6 +115,13 @@ pub(crate) struct Constructed<T> {
     pub table: Table,
 }
 
+impl<T: RecordType> Constructed<T> {
+    /// An error about the field `key`, at its line in the call that made the table.
+    pub(crate) fn invalid(&self, lua: &Lua, key: &str, message: impl Display) -> mlua::Error {
+        fail_at_key(lua, &self.table, key, format_args!("{}.{key}: {message}", T::RECORD.label))
+    }
+}
+
 impl<T> Deref for Constructed<T> {
     type Target = T;
 
@@ -153,20 +130,18 @@ impl<T> Deref for Constructed<T> {
     }
 }
 
-impl<T: RecordType> FromChecked for Constructed<T> {
-    fn from_checked(value: Value, lua: &Lua) -> mlua::Result<Self> {
-        let Value::Table(table) = &value else {
-            return Err(fail(lua, format!("expected {}{{…}}, got {}", T::RECORD.kind, describe(&value))));
-        };
-        let checked = check(lua, T::RECORD, table).map_err(|error| {
-            fail(lua, format!("{} (changed after it was made)", error.describe(T::RECORD.label)))
-        })?;
-        Ok(Self { spec: T::from_checked(Value::Table(checked), lua)?, table: table.clone() })
-    }
-}
-
 impl<T: RecordType> LuaType for Constructed<T> {
     const TYPE: Type = Type::Constructed(T::RECORDS);
+
+    fn from_checked(value: Value, lua: &Lua) -> mlua::Result<Self> {
+        let Value::Table(table) = &value else {
+            bail!(lua, "expected {}{{…}}, got {}", T::RECORD.kind, describe(&value));
+        };
+        let checked = Checker::new(lua)
+            .record(T::RECORD, table)
+            .map_err(|error| fail!(lua, "{} (changed after it was made)", error.describe(T::RECORD.label)))?;
+        Ok(Self { spec: T::from_checked(Value::Table(checked), lua)?, table: table.clone() })
+    }
 }
 
 /// The first of the given expressions: what a declaration says, else a default.
@@ -177,11 +152,14 @@ macro_rules! first {
 }
 pub(crate) use first;
 
-/// The result of a conversion from its converted fields: the struct with fields of these names, or what a
-/// function makes of them.
+/// The result of a conversion from its converted fields: the struct with fields of these names, or what an expression
+/// makes of them.
 macro_rules! made {
     ($lua:ident [$($field:ident)*]) => { Ok(Self { $($field),* }) };
-    ($lua:ident [$($field:ident)*] $make:expr) => { $make($lua, $($field),*) };
+    ($lua:ident [$($field:ident)*] |$own:pat_param| $make:expr) => {{
+        let $own = $lua;
+        $make
+    }};
 }
 pub(crate) use made;
 
@@ -206,7 +184,7 @@ macro_rules! fields {
 }
 pub(crate) use fields;
 
-/// Declares records.
+/// Declares records, tables that scripts write.
 ///
 /// ```text
 /// record! {
@@ -221,7 +199,7 @@ pub(crate) use fields;
 /// The Lua type may be left out where [`LuaType`] of the Rust type says enough, and so may the default: an `Option` may
 /// then be absent, and a nested record of which every field has a default. Constructor and
 /// [`Relation`](super::Relation) are optional. Gives the struct with its conversion from a checked table
-/// ([`FromChecked`]) and the [`Record`] by which tables are checked.
+/// ([`LuaType`]) and the [`Record`] by which tables are checked.
 macro_rules! record {
     ($(
         $(#[doc = $doc:literal])+
@@ -248,15 +226,14 @@ macro_rules! record {
 pub(crate) use record;
 
 /// Declares records whose struct is already defined: scripts then write such a struct as a table. The syntax is that of
-/// [`record!`]. The struct has fields of the same names, or `by make;` at the end names the function that makes it from
-/// the interpreter and the fields.
+/// [`record!`]. The struct has fields of the same names, or `by |lua| …;` at the end makes it from the fields.
 macro_rules! record_of {
     ($(
         $(#[doc = $doc:literal])+
         $name:ident : $class:literal as $label:literal $(, constructor $kind:literal)? $(, relation $relation:ident($related:expr))? {$(
             $(#[doc = $field_doc:literal])+
             $field:ident : $rust:ty $(= $ty:expr)? $(=> $presence:ident $(($default:expr))?)? ;
-        )*} $(by $make:expr ;)?
+        )*} $(by |$own:pat_param| $make:expr ;)?
     )+) => {$(
         impl $crate::schema::RecordType for $name {
             const RECORD: &'static $crate::schema::Record = &$crate::schema::Record {
@@ -274,22 +251,20 @@ macro_rules! record_of {
             };
         }
 
-        impl $crate::schema::FromChecked for $name {
-            fn from_checked(value: mlua::Value, lua: &mlua::Lua) -> mlua::Result<Self> {
-                let _table: mlua::Table = lua.unpack(value)?;
-                $(let $field: $rust = $crate::schema::FromChecked::from_checked(
-                    _table.raw_get(stringify!($field))?, lua
-                )?;)*
-                $crate::schema::convert::made!(lua [$($field)*] $($make)?)
-            }
-        }
-
         impl $crate::schema::LuaType for $name {
             const TYPE: $crate::schema::Type = $crate::schema::Type::Nested(
                 <Self as $crate::schema::RecordType>::RECORD
             );
             const PRESENCE: $crate::schema::FieldDefault =
                 <Self as $crate::schema::RecordType>::RECORD.presence();
+
+            fn from_checked(value: mlua::Value, lua: &mlua::Lua) -> mlua::Result<Self> {
+                let _table: mlua::Table = lua.unpack(value)?;
+                $(let $field: $rust = $crate::schema::LuaType::from_checked(
+                    _table.raw_get(stringify!($field))?, lua
+                )?;)*
+                $crate::schema::convert::made!(lua [$($field)*] $(|$own| $make)?)
+            }
         }
     )+};
 }
@@ -303,22 +278,25 @@ macro_rules! choice {
         #[derive(Clone, Copy, Debug, PartialEq, Eq)]
         pub(crate) enum $name { $($variant),+ }
 
+        impl $name {
+            pub(crate) fn name(self) -> &'static str {
+                match self { $(Self::$variant => $text),+ }
+            }
+        }
+
         $crate::schema::choice! { $name { $($text => $variant),+ } }
     };
     ($name:ty { $($text:literal => $variant:ident),+ $(,)? }) => {
-        impl $crate::schema::FromChecked for $name {
+        impl $crate::schema::LuaType for $name {
+            const TYPE: $crate::schema::Type = $crate::schema::Type::Choice(&[$($text),+]);
+
             fn from_checked(value: mlua::Value, lua: &mlua::Lua) -> mlua::Result<Self> {
                 let text: String = lua.unpack(value)?;
                 match text.as_str() {
                     $($text => Ok(Self::$variant),)+
-                    other => Err($crate::vm::error::fail(lua, format!("unexpected {other:?}"))),
+                    other => Err(fail!(lua, "unexpected {other:?}")),
                 }
             }
-        }
-
-        impl $crate::schema::LuaType for $name {
-            const TYPE: $crate::schema::Type =
-                $crate::schema::Type::Choice(&[$($text),+]);
         }
 
         impl $crate::schema::object::IntoFieldValue for $name {
@@ -330,7 +308,6 @@ macro_rules! choice {
 }
 pub(crate) use choice;
 
-/// A value that a constructor made.
 pub(crate) trait HasTable {
     /// The table itself, for messages about the place where it was made.
     fn table(&self) -> &Table;
@@ -345,24 +322,25 @@ macro_rules! one_of {
             $($variant($crate::schema::Constructed<$spec>)),+
         }
 
-        impl $crate::schema::FromChecked for $name {
+        impl $crate::schema::LuaType for $name {
+            const TYPE: $crate::schema::Type = $crate::schema::Type::Constructed(Self::RECORDS);
+
             fn from_checked(value: mlua::Value, lua: &mlua::Lua) -> mlua::Result<Self> {
                 let table: mlua::Table = lua.unpack(value)?;
                 $(
                     if $crate::schema::is_constructed(
                         lua, <$spec as $crate::schema::RecordType>::RECORD, &table
                     ) {
-                        let checked = $crate::schema::FromChecked::from_checked(mlua::Value::Table(table), lua);
+                        let checked = $crate::schema::LuaType::from_checked(mlua::Value::Table(table), lua);
                         return checked.map(Self::$variant);
                     }
                 )+
                 let expected = <Self as $crate::schema::LuaType>::TYPE.describe();
-                Err($crate::vm::error::fail(lua, format!("expected {expected}, got a table")))
+                Err(fail!(lua, "expected {expected}, got a table"))
             }
         }
 
         impl $name {
-            /// Records of the constructors.
             pub(crate) const RECORDS: &'static [&'static $crate::schema::Record] = &[
                 $(<$spec as $crate::schema::RecordType>::RECORD),+
             ];
@@ -372,10 +350,6 @@ macro_rules! one_of {
             fn table(&self) -> &mlua::Table {
                 match self { $(Self::$variant(made) => &made.table,)+ }
             }
-        }
-
-        impl $crate::schema::LuaType for $name {
-            const TYPE: $crate::schema::Type = $crate::schema::Type::Constructed(Self::RECORDS);
         }
     };
 }

@@ -2,21 +2,18 @@
 
 use mlua::{Lua, MultiValue, Table, Value};
 
-use super::{FieldDefault, Type, error_at_key, note_unusual};
+use super::{FieldDefault, Type, check, error_at_key};
 use crate::vm::{error::fail, value::describe};
 use softvt_common::text::counted;
 
-/// A function or method.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Signature {
     pub name: &'static str,
     pub params: &'static [Param],
-    /// LuaCATS types of the results.
     pub returns: &'static [&'static str],
     pub doc: &'static str,
 }
 
-/// A parameter; its argument is checked by its type.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Param {
     pub name: &'static str,
@@ -31,7 +28,6 @@ impl Param {
     }
 }
 
-/// A function of the `softvt` table.
 #[derive(Clone, Copy)]
 pub(crate) struct Function {
     pub signature: Signature,
@@ -74,20 +70,20 @@ pub(crate) fn arguments(
             (Value::Nil, FieldDefault::Empty) => Value::Table(lua.create_table()?),
             (value, _) => value,
         };
-        let checked = param.ty.check(lua, &value).map_err(|error| match param.ty {
-            // The keys of a table say enough.
-            Type::Nested(_) => error_at_key(lua, label, &error),
-            _ => fail(lua, error.describe(&format!("{label}: {}", param.name))),
-        })?;
-        note_unusual(lua, label, &param.ty, &checked);
-        Ok(checked)
+        check::checked(lua, label, |checker| checker.value(&param.ty, &value)).map_err(|error| {
+            match param.ty {
+                // The keys of a table say enough.
+                Type::Nested(_) => error_at_key(lua, label, &error),
+                _ => fail(lua, error.describe(&format!("{label}: {}", param.name))),
+            }
+        })
     });
     let checked = checked.collect::<mlua::Result<MultiValue>>()?;
     match values.find(|value| !value.is_nil()) {
         None => Ok(checked),
         Some(surplus) => {
             let expected = counted(signature.params.len(), "argument");
-            Err(fail(lua, format!("{label}: expected {expected}, got {} as well", describe(&surplus))))
+            Err(fail!(lua, "{label}: expected {expected}, got {} as well", describe(&surplus)))
         }
     }
 }
@@ -100,17 +96,20 @@ macro_rules! bind_arguments {
     (@each ($values:ident, $lua:ident) $($arg:ident : $arg_type:ty,)*) => {
         let mut _values = $values.into_iter();
         $(
-            let $arg: $arg_type = $crate::schema::FromChecked::from_checked(
+            let $arg: $arg_type = $crate::schema::LuaType::from_checked(
                 _values.next().unwrap_or(mlua::Value::Nil), $lua
             )?;
         )*
     };
-    (($values:ident, $lua:ident) $($arg:ident : $arg_type:ty),* ; takes $table:ident $($field:ident : $type:ty),*) => {
+    (($values:ident, $lua:ident) $($arg:ident : $arg_type:ty),* ; takes $table:ident {$(
+        $(#[doc = $field_doc:literal])+
+        $field:ident : $type:ty $(= $field_lua:expr)? $(=> $presence:ident $(($default:expr))?)? ;
+    )*}) => {
         $crate::schema::function::bind_arguments! {
             @each ($values, $lua) $($arg : $arg_type,)* $table : mlua::Table,
         }
         $(
-            let $field: $type = $crate::schema::FromChecked::from_checked(
+            let $field: $type = $crate::schema::LuaType::from_checked(
                 $table.raw_get(stringify!($field))?, $lua
             )?;
         )*
@@ -118,11 +117,10 @@ macro_rules! bind_arguments {
 }
 pub(crate) use bind_arguments;
 
-/// The [`Signature`] of a function or method.
 macro_rules! signature {
     (
         [$($doc:literal)*] $name:ident($($arg:ident : $arg_type:ty $(= $arg_lua:expr)?),*)
-        $(takes $table:ident $class:literal { $($fields:tt)* })?
+        $(takes $table:ident $class:literal $fields:tt)?
         -> [$($return:literal),*]
     ) => {{
         const DOC: &str = concat!($($doc),*);
@@ -143,7 +141,7 @@ macro_rules! signature {
                         class: $class,
                         kind: $class,
                         doc: DOC,
-                        fields: $crate::schema::convert::fields! { $($fields)* },
+                        fields: $crate::schema::convert::fields! $fields,
                         relation: None,
                     };
                     $crate::schema::function::Param {
@@ -168,26 +166,20 @@ macro_rules! functions {
     ($list:ident {$(
         $(#[doc = $doc:literal])+
         fn $name:ident($lua:pat_param $(, $arg:ident : $arg_type:ty $(= $arg_lua:expr)?)*)
-            $(takes $table:ident $class:literal {$(
-                $(#[doc = $field_doc:literal])+
-                $field:ident : $field_type:ty $(= $field_lua:expr)? $(=> $presence:ident $(($default:expr))?)? ;
-            )*})?
+            $(takes $table:ident $class:literal $fields:tt)?
             -> [$($return:literal),*] $body:block
     )*}) => {
         pub(crate) static $list: &[$crate::schema::Function] = &[$($crate::schema::Function {
             signature: $crate::schema::function::signature!(
                 [$($doc)*] $name($($arg : $arg_type $(= $arg_lua)?),*)
-                $(takes $table $class {$(
-                    $(#[doc = $field_doc])+
-                    $field : $field_type $(= $field_lua)? $(=> $presence $(($default))?)? ;
-                )*})?
+                $(takes $table $class $fields)?
                 -> [$($return),*]
             ),
             call: |state, values| {
                 $crate::schema::function::bind_arguments! {
                     (values, state)
                     $($arg : $arg_type),*
-                    $(; takes $table $($field : $field_type),*)?
+                    $(; takes $table $fields)?
                 }
                 let $lua = state;
                 mlua::IntoLuaMulti::into_lua_multi($body, state)

@@ -5,58 +5,59 @@
 //! declaration gives the Rust struct or the accessors, the check of every value with its messages, the stubs for
 //! language servers and the reference page. A key is therefore known everywhere or nowhere.
 
+/// A [`ValidationError`] with a formatted message.
+macro_rules! mismatch {
+    ($($message:tt)+) => { $crate::schema::ValidationError::new(format_args!($($message)+)) };
+}
+
 pub(crate) mod check;
 pub(crate) mod convert;
 pub(crate) mod function;
 pub(crate) mod object;
 mod output;
-mod usual;
+
+use std::fmt::Display;
 
 use mlua::{Lua, Table};
 
 pub(crate) use softvt_common::range::Range;
 
-pub(crate) use check::{error_at_key, invalid, is_constructed, make, validate};
+pub(crate) use check::{UnusualNumbers, error_at_key, invalid, is_constructed, make, validate};
 pub(crate) use convert::{
-    Constructed, FromChecked, HasTable, LuaType, RecordType, Unchecked, choice, one_of, record, record_of,
+    Constructed, HasTable, LuaType, RecordType, Unchecked, choice, one_of, record, record_of,
 };
 pub(crate) use function::{Function, Signature, functions};
 pub(crate) use object::{ApiObject, Class, FieldValue, class};
 pub(crate) use output::{output, strict_table};
-pub(crate) use usual::{UnusualNumbers, note_unusual};
 
-/// The values that a field or parameter accepts.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Type {
     /// A finite number in a unit ("" for none).
     Number(&'static str, Range),
-    /// A whole number.
     Integer(Range),
     /// A string that is not empty.
     Text,
-    /// Any string.
     Line,
     /// A string of letters, digits, `_` and `-`, so that it can be part of a path.
     Name,
-    /// `true` or `false`.
     Boolean,
     /// A list of a fixed number of numbers in a unit, each within the range.
     Vector(usize, &'static str, Range),
     /// The lowest and the highest of two numbers in a unit, each within the range.
     Interval(&'static str, Range),
-    /// A vector of any length but 0, in a frame, or one of these names of vectors.
+    /// A vector other than 0 in a frame, or the name of one.
     Direction(&'static [&'static str], &'static str),
-    /// A quaternion w, x, y, z of any length but 0, in a frame.
+    /// A quaternion w, x, y, z in a frame, of any positive length.
     Quaternion(&'static str),
-    /// One of these strings.
     Choice(&'static [&'static str]),
-    /// A function, with its LuaCATS signature.
     Function(&'static str),
-    /// A list of values of one type.
     List(&'static Type),
     /// A list of at least `min` values that differ in the field `by`, or, if that is "", themselves.
-    Distinct { of: &'static Type, by: &'static str, min: usize },
-    /// A table from strings to values of one type.
+    Distinct {
+        of: &'static Type,
+        by: &'static str,
+        min: usize,
+    },
     Map(&'static Type),
     /// A plain table, checked where it is written.
     Nested(&'static Record),
@@ -64,34 +65,24 @@ pub(crate) enum Type {
     Constructed(&'static [&'static Record]),
     /// A table that is checked elsewhere, with its LuaCATS type.
     Table(&'static str),
-    /// An object of this class.
     Object(&'static str),
     /// The first of these types that accepts the value.
     OneOf(&'static [Type]),
-    /// Any value but nil.
     Any,
 }
 
-/// The value of a field that is absent.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum FieldDefault {
-    /// The field must be given.
     Required,
-    /// nil.
     Optional,
-    /// A number.
     Number(f64),
-    /// A whole number.
     Integer(i64),
-    /// A string.
     Text(&'static str),
-    /// A boolean.
     Boolean(bool),
     /// A nested table with the defaults of its own fields.
     Empty,
 }
 
-/// A field of a record.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Field {
     pub name: &'static str,
@@ -100,7 +91,6 @@ pub(crate) struct Field {
     pub doc: &'static str,
 }
 
-/// A kind of table that scripts write.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Record {
     /// Name in messages: `task.goal`.
@@ -111,7 +101,6 @@ pub(crate) struct Record {
     pub kind: &'static str,
     pub doc: &'static str,
     pub fields: &'static [Field],
-    /// Relation between the fields.
     pub relation: Option<Relation>,
 }
 
@@ -123,7 +112,7 @@ pub(crate) enum Relation {
     /// None of these numbers, of those that are given, is below the one before it.
     NotDecreasing(&'static [&'static str]),
     /// Another one, which the constructor checks.
-    Checked(fn(&Lua, &Record, &Table) -> mlua::Result<()>),
+    Checked(fn(&Lua, &Table) -> Result<(), ValidationError>),
 }
 
 impl Record {
@@ -228,13 +217,12 @@ fn unit_words(unit: &str) -> String {
 pub(crate) struct ValidationError {
     /// Keys from the outermost table inwards; `[3]` for a place in a list.
     pub path: Vec<String>,
-    /// A lower-case fragment.
     pub message: String,
 }
 
 impl ValidationError {
-    pub(crate) fn new(message: impl Into<String>) -> Self {
-        Self { path: Vec::new(), message: message.into() }
+    pub(crate) fn new(message: impl Display) -> Self {
+        Self { path: Vec::new(), message: message.to_string() }
     }
 
     /// The same error seen from the table that holds the value as `key`.

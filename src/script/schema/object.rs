@@ -6,8 +6,8 @@ use mlua::{
 
 use super::{
     Type,
+    check::checked,
     function::{Signature, arguments},
-    note_unusual,
 };
 use crate::vm::{error::fail, list::LuaList, value::describe};
 use softvt_common::text::unknown_name;
@@ -16,16 +16,12 @@ use softvt_geometry::Vec3;
 /// A class of objects or of tables that scripts receive: the part that stubs, reference and messages need.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Class {
-    /// `softvt.Rng`.
     pub name: &'static str,
     pub doc: &'static str,
-    pub fields: &'static [LuaField],
-    /// Fields that are read-only and declared elsewhere, such as the streams of the robot.
-    pub declared: fn() -> Vec<LuaField>,
+    pub fields: fn() -> Vec<LuaField>,
     pub methods: &'static [Signature],
 }
 
-/// A field of a class.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct LuaField {
     pub name: &'static str,
@@ -33,7 +29,6 @@ pub(crate) struct LuaField {
     pub doc: &'static str,
 }
 
-/// Use of a field by scripts.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Access {
     /// Read-only, with its LuaCATS type, and how to change it instead.
@@ -47,39 +42,23 @@ impl Class {
         self.name.rsplit('.').next().unwrap_or(self.name)
     }
 
-    /// All fields.
-    pub(crate) fn all_fields(&self) -> impl Iterator<Item = LuaField> + Clone + use<> {
-        self.fields.iter().copied().chain((self.declared)())
-    }
-
-    fn keys(&self) -> impl Iterator<Item = &'static str> + Clone + use<> {
-        self.all_fields().map(|field| field.name).chain(self.methods.iter().map(|method| method.name))
-    }
-
-    fn field(&self, name: &str) -> Option<usize> {
-        self.all_fields().position(|field| field.name == name)
-    }
-
     /// The error for a name that is neither a field nor a method.
-    pub(crate) fn unknown_key_error(&self, lua: &Lua, label: &str, key: &str) -> mlua::Error {
-        match self.keys().next() {
-            Some(_) => fail(lua, format!("{label}: {}", unknown_name("key", key, self.keys()))),
-            None => fail(lua, format!("{label}: has no key {key:?}")),
+    fn unknown_key_error(&self, lua: &Lua, label: &str, key: &str) -> mlua::Error {
+        let fields = (self.fields)();
+        let keys = fields.iter().map(|field| field.name).chain(self.methods.iter().map(|method| method.name));
+        match keys.clone().next() {
+            Some(_) => fail!(lua, "{label}: {}", unknown_name("key", key, keys)),
+            None => fail!(lua, "{label}: has no key {key:?}"),
         }
     }
 
     /// The error for a method called without its object: most often a point was written for a colon.
     pub(crate) fn missing_self_error(&self, lua: &Lua, method: &str, first: &Value) -> mlua::Error {
         let (short, got) = (self.short_name().to_lowercase(), describe(first));
-        let message = format!(
-            "{short}:{method}: expected a {} before the colon, got {got}; call it as {short}:{method}(…)",
-            self.name
-        );
-        fail(lua, message)
+        fail!(lua, "{short}:{method}: got {got}; call it as {short}:{method}(…)")
     }
 }
 
-/// The value of a field of an object.
 pub(crate) enum FieldValue {
     Value(Value),
     /// Numbers that scripts may write one by one, if the field is writable.
@@ -88,7 +67,6 @@ pub(crate) enum FieldValue {
     ReadOnly(Table, &'static str),
 }
 
-/// Results of getters.
 pub(crate) trait IntoFieldValue {
     fn into_field_value(self, lua: &Lua) -> mlua::Result<FieldValue>;
 }
@@ -127,13 +105,7 @@ macro_rules! plain_field_values {
     )+ };
 }
 
-plain_field_values!(f64, Option<f64>, usize, u32, bool, String, Option<String>, Value, Table, Option<Table>);
-
-impl IntoFieldValue for &str {
-    fn into_field_value(self, lua: &Lua) -> mlua::Result<FieldValue> {
-        self.into_lua(lua).map(FieldValue::Value)
-    }
-}
+plain_field_values! { f64, Option<f64>, usize, u32, bool, &str, String, Option<String>, Value, Table, Option<Table> }
 
 /// A list that cannot be written; `hint` says how to change it instead.
 pub(crate) fn read_only_list<T: IntoLua>(
@@ -151,34 +123,49 @@ pub(crate) const MEASURED: &str = "it is measured";
 /// of the interface itself.
 pub(crate) fn object_of<T: ApiObject>(lua: &Lua, value: &Value) -> mlua::Result<T> {
     let object = value.as_userdata().and_then(|data| data.borrow::<T>().ok().map(|object| object.clone()));
-    object.ok_or_else(|| fail(lua, format!("expected a {}, got {}", T::NAME, describe(value))))
+    object.ok_or_else(|| fail!(lua, "expected a {}, got {}", T::NAME, describe(value)))
 }
 
 pub(crate) type Getter<T> = fn(&Lua, &T) -> mlua::Result<FieldValue>;
 pub(crate) type Setter<T> = fn(&Lua, &T, Value) -> mlua::Result<()>;
 pub(crate) type Method<T> = fn(&Lua, &T, MultiValue) -> mlua::Result<MultiValue>;
 
+/// A field of the objects of a class.
+pub(crate) struct ObjectField<T: 'static> {
+    pub field: LuaField,
+    pub get: Getter<T>,
+    /// `None` for a read-only one.
+    pub set: Option<Setter<T>>,
+}
+
+/// All fields of a class.
+pub(crate) fn fields_of<T: ApiObject>() -> Vec<LuaField> {
+    T::FIELDS.iter().map(|known| known.field).chain(T::declared()).collect()
+}
+
 /// An object that scripts hold: a cheap handle. Declared by [`class!`].
 pub(crate) trait ApiObject: Clone + Send + Sync + UserData + FromLua + 'static {
     /// Name of the class, on which types in its own description may depend.
     const NAME: &'static str;
     const CLASS: &'static Class;
-    /// One per field of the class that is not declared elsewhere.
-    const GETTERS: &'static [Getter<Self>];
-    /// The same; `None` for those that are read-only.
-    const SETTERS: &'static [Option<Setter<Self>>];
+    /// Fields that are not declared elsewhere.
+    const FIELDS: &'static [ObjectField<Self>];
     /// One per method of the class that is not implemented in Lua.
     const METHODS: &'static [Method<Self>];
 
     /// Name in messages: `scene:camera("wrist")`.
     fn label(&self) -> String;
 
-    /// Value of a field that is declared elsewhere; nil if there is none of this index.
-    fn declared_field(&self, _: &Lua, _: usize) -> mlua::Result<FieldValue> {
-        Ok(FieldValue::Value(Value::Nil))
+    /// Fields that are read-only and declared elsewhere, such as the streams of the robot.
+    fn declared() -> Vec<LuaField> {
+        Vec::new()
     }
 
-    /// Result of `tostring`.
+    /// Value of a field that is declared elsewhere.
+    fn declared_field(&self, _: &Lua, _: &str) -> mlua::Result<Option<FieldValue>> {
+        Ok(None)
+    }
+
     fn text(&self) -> String {
         Self::NAME.to_owned()
     }
@@ -197,7 +184,7 @@ pub(crate) trait ApiObject: Clone + Send + Sync + UserData + FromLua + 'static {
 ///             name: "LuaCATS type" { get(lua, this) { … } }
 ///             name: "LuaCATS type" or "how to change it instead" { get(lua, this) { … } }
 ///         }
-///         declared list_of_fields { get(lua, this, index) { … } }          // read-only, declared elsewhere
+///         declared list_of_fields { get(lua, this, name) { … } }           // read-only, declared elsewhere
 ///         writable {
 ///             /// Documentation.
 ///             name: Type::… => path.to.field;                  // of the target of RustType::read and RustType::change
@@ -231,7 +218,7 @@ macro_rules! class {
                 }
             )*})?
             $(declared $declared:path {
-                get($declared_lua:pat_param, $declared_this:pat_param, $index:pat_param) $declared_get:block
+                get($declared_lua:pat_param, $declared_this:pat_param, $declared_name:pat_param) $declared_get:block
             })?
             $(writable {$(
                 $(#[doc = $write_doc:literal])+
@@ -243,10 +230,7 @@ macro_rules! class {
             $(methods {$(
                 $(#[doc = $method_doc:literal])+
                 fn $method:ident($method_lua:pat_param, $method_this:pat_param $(, $arg:ident : $arg_type:ty $(= $arg_lua:expr)?)*)
-                    $(takes $table:ident $table_class:literal {$(
-                        $(#[doc = $field_doc:literal])+
-                        $field:ident : $field_type:ty $(= $field_lua:expr)? $(=> $presence:ident $(($default:expr))?)? ;
-                    )*})?
+                    $(takes $table:ident $table_class:literal $table_fields:tt)?
                     -> [$($return:literal),*] $body:block
             )*})?
             $(lua_methods {$(
@@ -261,29 +245,11 @@ macro_rules! class {
             const CLASS: &'static $crate::schema::Class = &$crate::schema::Class {
                 name: Self::NAME,
                 doc: concat!($($doc),+),
-                fields: &[
-                    $($($crate::schema::object::LuaField {
-                        name: stringify!($read),
-                        access: $crate::schema::object::Access::Read(
-                            $read_type,
-                            $crate::schema::convert::first!($(Some($hint),)? None),
-                        ),
-                        doc: concat!($($read_doc),+),
-                    },)*)?
-                    $($($crate::schema::object::LuaField {
-                        name: stringify!($write),
-                        access: $crate::schema::object::Access::Write($write_type),
-                        doc: concat!($($write_doc),+),
-                    },)*)?
-                ],
-                declared: $crate::schema::convert::first!($($declared,)? Vec::new),
+                fields: $crate::schema::object::fields_of::<Self>,
                 methods: &[
                     $($($crate::schema::function::signature!(
                         [$($method_doc)*] $method($($arg : $arg_type $(= $arg_lua)?),*)
-                        $(takes $table $table_class {$(
-                            $(#[doc = $field_doc])+
-                            $field : $field_type $(= $field_lua)? $(=> $presence $(($default))?)? ;
-                        )*})?
+                        $(takes $table $table_class $table_fields)?
                         -> [$($return),*]
                     ),)*)?
                     $($($crate::schema::function::signature!(
@@ -292,43 +258,58 @@ macro_rules! class {
                     ),)*)?
                 ],
             };
-            const GETTERS: &'static [$crate::schema::object::Getter<Self>] = &[
-                $($(|state, object| {
-                    let ($read_lua, $read_this) = (state, object);
-                    $crate::schema::object::IntoFieldValue::into_field_value($read_get, state)
+            const FIELDS: &'static [$crate::schema::object::ObjectField<Self>] = &[
+                $($($crate::schema::object::ObjectField {
+                    field: $crate::schema::object::LuaField {
+                        name: stringify!($read),
+                        access: $crate::schema::object::Access::Read(
+                            $read_type,
+                            $crate::schema::convert::first!($(Some($hint),)? None),
+                        ),
+                        doc: concat!($($read_doc),+),
+                    },
+                    get: |state, object| {
+                        let ($read_lua, $read_this) = (state, object);
+                        $crate::schema::object::IntoFieldValue::into_field_value($read_get, state)
+                    },
+                    set: None,
                 },)*)?
-                $($(|state, object| {
-                    $({
-                        let value = object.read(|target| target $(.$path)+);
-                        $crate::schema::object::IntoFieldValue::into_field_value(value, state)
-                    })?
-                    $({
-                        let ($get_lua, $get_this) = (state, object);
-                        $crate::schema::object::IntoFieldValue::into_field_value($get, state)
-                    })?
+                $($($crate::schema::object::ObjectField {
+                    field: $crate::schema::object::LuaField {
+                        name: stringify!($write),
+                        access: $crate::schema::object::Access::Write($write_type),
+                        doc: concat!($($write_doc),+),
+                    },
+                    get: |state, object| {
+                        $({
+                            let value = object.read(|target| target $(.$path)+);
+                            $crate::schema::object::IntoFieldValue::into_field_value(value, state)
+                        })?
+                        $({
+                            let ($get_lua, $get_this) = (state, object);
+                            $crate::schema::object::IntoFieldValue::into_field_value($get, state)
+                        })?
+                    },
+                    set: Some(|state, object, value| {
+                        $(
+                            let value = $crate::schema::LuaType::from_checked(value, state)?;
+                            object.change(state, |target| target $(.$path)+ = value);
+                        )?
+                        $(
+                            let $value: $value_type = $crate::schema::LuaType::from_checked(value, state)?;
+                            let ($set_lua, $set_this) = (state, object);
+                            $set
+                        )?
+                        Ok(())
+                    }),
                 },)*)?
-            ];
-            const SETTERS: &'static [Option<$crate::schema::object::Setter<Self>>] = &[
-                $($({ let _ = stringify!($read); None },)*)?
-                $($(Some(|state, object, value| {
-                    $(
-                        let value = $crate::schema::FromChecked::from_checked(value, state)?;
-                        object.change(state, |target| target $(.$path)+ = value);
-                    )?
-                    $(
-                        let $value: $value_type = $crate::schema::FromChecked::from_checked(value, state)?;
-                        let ($set_lua, $set_this) = (state, object);
-                        $set
-                    )?
-                    Ok(())
-                }),)*)?
             ];
             const METHODS: &'static [$crate::schema::object::Method<Self>] = &[
                 $($(|state, object, values| {
                     $crate::schema::function::bind_arguments! {
                         (values, state)
                         $($arg : $arg_type),*
-                        $(; takes $table $($field : $field_type),*)?
+                        $(; takes $table $table_fields)?
                     }
                     let ($method_lua, $method_this) = (state, object);
                     mlua::IntoLuaMulti::into_lua_multi($body, state)
@@ -345,14 +326,20 @@ macro_rules! class {
                 $text
             })?
 
-            $(fn declared_field(
-                &self,
-                lua: &mlua::Lua,
-                index: usize,
-            ) -> mlua::Result<$crate::schema::object::FieldValue> {
-                let ($declared_lua, $declared_this, $index) = (lua, self, index);
-                $crate::schema::object::IntoFieldValue::into_field_value($declared_get, lua)
-            })?
+            $(
+                fn declared() -> Vec<$crate::schema::object::LuaField> {
+                    $declared()
+                }
+
+                fn declared_field(
+                    &self,
+                    lua: &mlua::Lua,
+                    name: &str,
+                ) -> mlua::Result<Option<$crate::schema::object::FieldValue>> {
+                    let ($declared_lua, $declared_this, $declared_name) = (lua, self, name);
+                    Ok($declared_get)
+                }
+            )?
         }
 
         impl mlua::FromLua for $object {
@@ -374,12 +361,10 @@ macro_rules! class {
 }
 pub(crate) use class;
 
-/// Sets the name of the class.
 pub(crate) fn add_fields<T: ApiObject, F: UserDataFields<T>>(fields: &mut F) {
     fields.add_meta_field(MetaMethod::Type, T::NAME);
 }
 
-/// Adds fields, methods and the text of an object.
 pub(crate) fn add_methods<T: ApiObject, M: UserDataMethods<T>>(methods: &mut M) {
     methods.add_meta_method(MetaMethod::ToString, |_, this, _: MultiValue| Ok(this.text()));
     methods.add_meta_method(MetaMethod::Index, |lua, this, key: Value| read(lua, this, &key));
@@ -399,84 +384,78 @@ pub(crate) fn add_methods<T: ApiObject, M: UserDataMethods<T>>(methods: &mut M) 
     }
 }
 
-/// The field or method name that a key is.
 fn name_of<T: ApiObject>(lua: &Lua, this: &T, key: &Value) -> mlua::Result<String> {
     match key {
         Value::String(name) => Ok(name.to_string_lossy()),
-        other => {
-            let message =
-                format!("{}: expected the name of a field or method, got {}", this.label(), describe(other));
-            Err(fail(lua, message))
-        }
+        other => Err(fail!(lua, "{}: expected the name of a field, got {}", this.label(), describe(other))),
     }
+}
+
+fn field<T: ApiObject>(name: &str) -> Option<&'static ObjectField<T>> {
+    T::FIELDS.iter().find(|known| known.field.name == name)
 }
 
 fn read<T: ApiObject>(lua: &Lua, this: &T, key: &Value) -> mlua::Result<Value> {
     let name = name_of(lua, this, key)?;
-    let Some(index) = T::CLASS.field(&name) else {
-        return Err(T::CLASS.unknown_key_error(lua, &this.label(), &name));
+    let field = field::<T>(&name);
+    let value = match field {
+        Some(field) => Some((field.get)(lua, this)?),
+        None => this.declared_field(lua, &name)?,
     };
-    let get = move |lua: &Lua, this: &T| match T::GETTERS.get(index) {
-        Some(get) => get(lua, this),
-        None => this.declared_field(lua, index - T::GETTERS.len()),
-    };
-    let set = T::SETTERS.get(index).copied().flatten();
     let label = || format!("{}.{name}", this.label());
-    let list = match get(lua, this)? {
+    let list = match value.ok_or_else(|| T::CLASS.unknown_key_error(lua, &this.label(), &name))? {
         FieldValue::Value(value) => return Ok(value),
         FieldValue::ReadOnly(entries, hint) => LuaList::read_only(label(), entries, hint),
-        FieldValue::Numbers(numbers) if set.is_none() => {
-            let hint = match T::CLASS.all_fields().nth(index).map(|field| field.access) {
-                Some(Access::Read(_, Some(hint))) => hint,
-                _ => MEASURED,
-            };
-            LuaList::read_only(label(), lua.create_sequence_from(numbers)?, hint)
-        }
-        FieldValue::Numbers(_) => {
-            let (reader, writer) = (this.clone(), this.clone());
-            let get = move |lua: &Lua| match get(lua, &reader)? {
-                FieldValue::Numbers(numbers) => Ok(numbers),
-                FieldValue::Value(_) | FieldValue::ReadOnly(..) => Ok(Vec::new()),
-            };
-            let set = move |lua: &Lua, value: &Value| write_field(lua, &writer, index, value);
-            LuaList::live(label(), Box::new(get), Box::new(set))
-        }
+        FieldValue::Numbers(numbers) => match field.filter(|field| field.set.is_some()) {
+            None => {
+                let hint = match field.map(|field| field.field.access) {
+                    Some(Access::Read(_, Some(hint))) => hint,
+                    _ => MEASURED,
+                };
+                LuaList::read_only(label(), lua.create_sequence_from(numbers)?, hint)
+            }
+            Some(field) => {
+                let (reader, writer) = (this.clone(), this.clone());
+                let get = move |lua: &Lua| match (field.get)(lua, &reader)? {
+                    FieldValue::Numbers(numbers) => Ok(numbers),
+                    FieldValue::Value(_) | FieldValue::ReadOnly(..) => Ok(Vec::new()),
+                };
+                let set = move |lua: &Lua, value: &Value| write_field(lua, &writer, field, value);
+                LuaList::live(label(), Box::new(get), Box::new(set))
+            }
+        },
     };
     lua.create_userdata(list).map(Value::UserData)
 }
 
 fn write<T: ApiObject>(lua: &Lua, this: &T, key: &Value, value: &Value) -> mlua::Result<()> {
-    let (label, class) = (this.label(), T::CLASS);
+    let label = this.label();
     let name = name_of(lua, this, key)?;
-    if let Some(index) = class.field(&name) {
-        return write_field(lua, this, index, value);
+    if let Some(field) = field::<T>(&name) {
+        return write_field(lua, this, field, value);
     }
-    if class.methods.iter().any(|method| method.name == name) {
-        let message =
-            format!("{label}.{name}: is a method and cannot be written; call it as {label}:{name}(…)");
-        return Err(fail(lua, message));
+    if T::declared().iter().any(|known| known.name == name) {
+        bail!(lua, "{label}.{name}: is read-only");
     }
-    let writable = class.all_fields().filter(|field| matches!(field.access, Access::Write(_)));
-    let names = writable.map(|field| field.name);
+    if T::CLASS.methods.iter().any(|method| method.name == name) {
+        bail!(lua, "{label}.{name}: is a method and cannot be written; call it as {label}:{name}(…)");
+    }
+    let names = T::FIELDS.iter().filter(|known| known.set.is_some()).map(|known| known.field.name);
     Err(match names.clone().next() {
-        Some(_) => fail(lua, format!("{label}: {}", unknown_name("key", &name, names))),
-        None => fail(lua, format!("{label}: has no key {name:?} and no writable ones")),
+        Some(_) => fail!(lua, "{label}: {}", unknown_name("key", &name, names)),
+        None => fail!(lua, "{label}: has no key {name:?} and no writable ones"),
     })
 }
 
 /// Checks a value and passes it to the setter of a field.
-fn write_field<T: ApiObject>(lua: &Lua, this: &T, index: usize, value: &Value) -> mlua::Result<()> {
-    let Some(field) = T::CLASS.all_fields().nth(index) else { return Ok(()) };
-    let label = format!("{}.{}", this.label(), field.name);
-    match (&field.access, T::SETTERS.get(index).copied().flatten()) {
+fn write_field<T: ApiObject>(lua: &Lua, this: &T, field: &ObjectField<T>, value: &Value) -> mlua::Result<()> {
+    let label = format!("{}.{}", this.label(), field.field.name);
+    match (&field.field.access, field.set) {
         (Access::Write(ty), Some(set)) => {
-            let value = ty.check(lua, value).map_err(|error| fail(lua, error.describe(&label)))?;
-            note_unusual(lua, &label, ty, &value);
-            set(lua, this, value)
+            let value = checked(lua, &label, |checker| checker.value(ty, value));
+            set(lua, this, value.map_err(|error| fail(lua, error.describe(&label)))?)
         }
-        (Access::Read(_, Some(hint)), _) => Err(fail(lua, format!("{label}: cannot be replaced; {hint}"))),
-        (Access::Read(_, None), _) | (Access::Write(_), None) => {
-            Err(fail(lua, format!("{label}: is read-only")))
-        }
+        (Access::Read(_, Some(hint)), _) => Err(fail!(lua, "{label}: cannot be replaced; {hint}")),
+        _ => Err(fail!(lua, "{label}: is read-only")),
     }
 }

@@ -2,7 +2,7 @@
 
 use mlua::{Lua, Table, Value};
 
-use crate::vm::{error::fail, value::describe};
+use crate::vm::value::describe;
 use softvt_common::text::unknown_name;
 
 /// Declares tables that scripts receive: the class for stubs and reference, and the function that fills such a table.
@@ -19,13 +19,13 @@ use softvt_common::text::unknown_name;
 ///
 /// The name of the function is also that of the module with the [`Class`]. Reading or writing another key is an error.
 macro_rules! output {
-    (
+    ($(
         $(#[doc = $doc:literal])+
         fn $name:ident($lua:ident $(, $arg:ident : $arg_type:ty)*) -> $class:literal as $label:literal {$(
             $(#[doc = $field_doc:literal])+
             $field:ident : $field_type:literal = $value:expr;
         )*}
-    ) => {
+    )+) => {$(
         $(#[doc = $doc])+
         pub(crate) fn $name($lua: &mlua::Lua $(, $arg: $arg_type)*) -> mlua::Result<mlua::Table> {
             let table = $lua.create_table()?;
@@ -37,16 +37,15 @@ macro_rules! output {
             pub(crate) static CLASS: $crate::schema::Class = $crate::schema::Class {
                 name: $class,
                 doc: concat!($($doc),+),
-                fields: &[$($crate::schema::object::LuaField {
+                fields: || vec![$($crate::schema::object::LuaField {
                     name: stringify!($field),
                     access: $crate::schema::object::Access::Read($field_type, None),
                     doc: concat!($($field_doc),+),
                 }),*],
-                declared: Vec::new,
                 methods: &[],
             };
         }
-    };
+    )+};
 }
 pub(crate) use output;
 
@@ -61,9 +60,9 @@ pub(crate) fn strict_table(lua: &Lua, label: &str, table: Table, names: Vec<Stri
         }
         Value::String(key) => {
             let known = names.iter().map(String::as_str);
-            Err(fail(lua, format!("{name}: {}", unknown_name("key", &key.to_string_lossy(), known))))
+            Err(fail!(lua, "{name}: {}", unknown_name("key", &key.to_string_lossy(), known)))
         }
-        key => Err(fail(lua, format!("{name}: expected a name as key, got {}", describe(key)))),
+        key => Err(fail!(lua, "{name}: expected a name as key, got {}", describe(key))),
     })?;
     // Lua asks the metatable only for keys without a value; reading a known one stores and returns nil.
     meta.set("__index", &refuse)?;

@@ -2,9 +2,8 @@ use std::sync::Arc;
 
 use super::*;
 use crate::{
-    EpisodeSetup, ExpertController, ExpertGrip, SceneChanges,
+    ExpertController, ExpertGrip,
     api::expert_input::{ArmReach, ExpertCommand, ExpertView, ObjectView},
-    check_shift,
 };
 use softvt_benchmark::{Goal, Plan, ShiftValue};
 use softvt_geometry::{Pose, Vec3, shape::Shape};
@@ -30,12 +29,7 @@ fn ball() -> ObjectView {
             visuals: Vec::new(),
             hints: Default::default(),
         }),
-        scale: 1.0,
-        youngs_factor: None,
-        density_factor: None,
-        strain_factor: None,
-        coating: None,
-        nominal: None,
+        placed: None,
         pose_w: Pose::translation(0.1, 0.0, 0.0),
         centre_w: Vec3::new(0.1, 0.0, 0.03),
         yaw: 0.0,
@@ -66,7 +60,7 @@ fn expert(body: &str) -> (Project, ExpertController) {
     let places = "local places = require 'experts.places'";
     let project = project(&format!("{places} return suite(function(arm, scene) {body} end)"));
     let loaded = project.load("x.lua", &[]).unwrap();
-    let setup = EpisodeSetup::open(&loaded, &episode_id(0, 1), &SceneChanges::default()).unwrap();
+    let setup = open(&loaded, &episode_id(0, 1)).unwrap();
     (project, setup.expert(ExpertGrip::Commanded).unwrap())
 }
 
@@ -79,10 +73,9 @@ pub(super) fn step(expert: &mut ExpertController) -> Result<Option<ExpertCommand
 
 fn run(body: &str) -> Result<Vec<ExpertCommand>, String> {
     let (project, mut expert) = expert(body);
-    let folder = format!("{}/", project.path("").display()).replace("//", "/");
     let mut commands = Vec::new();
     while commands.len() < 1000 {
-        match step(&mut expert).map_err(|e| e.to_string().replace(&folder, ""))? {
+        match step(&mut expert).map_err(|e| project.shorten(e))? {
             Some(command) => commands.push(command),
             None => break,
         }
@@ -105,9 +98,7 @@ fn a_list_of_suites_is_a_plan_and_tasks_are_found_by_name() {
     assert!(matches!(&loaded.plan, Plan::Suites { suites } if suites.len() == 1));
     let open = |suite: &str, task| {
         let id = EpisodeId { suite: suite.into(), task, ..episode_id(0, 1) };
-        EpisodeSetup::open(&loaded, &id, &SceneChanges::default())
-            .map(|e| e.scene.objects.len())
-            .map_err(|e| (e.message, e.hint))
+        super::open(&loaded, &id).map(|e| e.scene.objects.len()).map_err(|e| (e.message, e.hint))
     };
     assert_eq!(open("test", 0), Ok(2));
     assert_eq!(open("tst", 0), Err(("unknown suite \"tst\"; did you mean \"test\"?".into(), None)));
@@ -120,9 +111,7 @@ fn a_list_of_suites_is_a_plan_and_tasks_are_found_by_name() {
 #[test]
 fn an_episode_depends_on_its_seed_alone() {
     let loaded = project("return suite()").load("x.lua", &[]).unwrap();
-    let scene = |episode, seed| {
-        EpisodeSetup::open(&loaded, &episode_id(episode, seed), &SceneChanges::default()).unwrap().scene
-    };
+    let scene = |episode, seed| open(&loaded, &episode_id(episode, seed)).unwrap().scene;
     assert_eq!(scene(0, 1), scene(0, 1));
     assert_ne!(scene(0, 1).objects[0].pose_w, scene(1, 1).objects[0].pose_w);
     assert_ne!(scene(0, 1).objects[0].pose_w, scene(0, 2).objects[0].pose_w);
@@ -136,31 +125,7 @@ fn an_episode_runs_on_the_files_of_its_plan() {
     let project = project("return suite()");
     let loaded = project.load("x.lua", &[]).unwrap();
     project.write("x.lua", b"error('changed')");
-    assert!(EpisodeSetup::open(&loaded, &episode_id(0, 1), &SceneChanges::default()).is_ok());
-}
-
-#[test]
-fn the_library_scales_stiffness_and_mass() {
-    let project =
-        project("local shifts = require 'shifts'\nreturn suite(nil, { shifts.stiffness, shifts.mass })");
-    let loaded = project.load("x.lua", &[]).unwrap();
-    assert!(loaded.sources.bundle.files.contains_key("scripts/shifts.lua"));
-    let shifts = [("stiffness", 0.5), ("mass", 2.0)].map(|(name, value)| (name.to_owned(), value).into());
-    let scene = EpisodeSetup::open(
-        &loaded,
-        &episode_id(0, 1),
-        &SceneChanges { shifts: shifts.into(), ..SceneChanges::default() },
-    )
-    .unwrap()
-    .scene;
-    let Body::Soft(soft) = &scene.objects[0].asset.body else { panic!("the ball is soft") };
-    assert_eq!((soft.elastic.youngs_pa(), soft.elastic.density()), (20e3, 400.0));
-    let Plan::Suite(suite) = &loaded.plan else { panic!("{:?}", loaded.plan) };
-    assert!(check_shift(&suite.shifts, "mass", 2.0).is_ok());
-    assert_eq!(
-        check_shift(&suite.shifts, "mass", 0.0).map_err(|error| error.to_string()),
-        Err("shift mass: expected a number in 0.01..100 (1), got 0".to_owned())
-    );
+    assert!(open(&loaded, &episode_id(0, 1)).is_ok());
 }
 
 #[test]
@@ -205,14 +170,12 @@ fn an_episode_of_another_suite_than_that_of_the_plan_is_refused() {
     let project = Project::new(&[("x.lua", &text)]);
     let mut loaded = project.load("x.lua", &[]).expect("a suite");
     let id = episode_id(0, 0);
-    assert!(EpisodeSetup::open(&loaded, &id, &SceneChanges::default()).is_ok());
+    assert!(super::open(&loaded, &id).is_ok());
     let Plan::Suite(suite) = &mut loaded.plan else { panic!("a suite") };
     if let Goal::On(of) | Goal::Inside(of) = &mut suite.tasks[0].goal {
         of.target = "ball".into();
     }
-    let Err(error) = EpisodeSetup::open(&loaded, &id, &SceneChanges::default()) else {
-        panic!("another goal")
-    };
+    let Err(error) = super::open(&loaded, &id) else { panic!("another goal") };
     assert!(error.message.starts_with("suite \"test\" differs from that of the plan"), "{error}");
     assert!(error.line.is_some(), "{error}");
 }

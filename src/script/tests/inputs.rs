@@ -10,14 +10,13 @@ use super::{Project, episode_id, episodes::step, policies};
 use crate::{EpisodeSetup, Experiment, ExpertGrip, LoadedScript, SceneChanges, ScriptError, load_profile};
 use softvt_benchmark::{Plan, ShiftValue};
 use softvt_common::text::counted;
-use softvt_policy::Policy;
+use softvt_policy::{Policy, profile::GripCode};
 
 /// Path of the file of an input in its project.
 fn main(input: &Input) -> &str {
     input.properties.get("main").map_or("x.lua", String::as_str)
 }
 
-/// Compares the answers to the inputs of a folder.
 fn check(folder: &str, answer: impl Fn(&Project, &Input) -> Result<String, String>) {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/bad").join(folder);
     fixtures::check(&folder, |_, input| {
@@ -80,11 +79,14 @@ fn first_result(loaded: &LoadedScript, input: &Input) -> Result<String, ScriptEr
 
 #[test]
 fn policies() {
-    check("policies", |project, _| {
+    check("policies", |project, input| {
         let file = policies::load(project, "x.lua").map_err(|error| error.to_string())?;
-        let mut policy = file.start(&policies::seed(0), None).map_err(|error| error.to_string())?;
+        let gripper = input.properties.get("gripper").and_then(|code| GripCode::named(code));
+        let mut policy = file.start(&policies::seed(0), gripper).map_err(|error| error.to_string())?;
         let chunk = policy.act(&policies::observation()).map_err(|error| error.to_string())?;
-        Ok(counted(chunk.commands.len(), "command"))
+        let shown =
+            chunk.commands.iter().map(|command| format!("{:.3?}, {:.3?}", command.motion, command.grip));
+        Ok(shown.collect::<Vec<_>>().join("\n"))
     });
 }
 

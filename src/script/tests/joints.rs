@@ -1,5 +1,4 @@
 use super::*;
-use crate::{EpisodeSetup, SceneChanges};
 use softvt_geometry::{Pose, Vec3};
 use softvt_physics::joints;
 use softvt_rollout::{AssetCache, Simulation};
@@ -31,20 +30,7 @@ fn suite(chest: &str, place: &str) -> String {
 fn open(text: &str) -> Result<Scene, String> {
     let project = Project::new(&[("x.lua", text)]);
     let loaded = project.load("x.lua", &[]).map_err(|e| e.message)?;
-    let folder = format!("{}/", project.path("").display()).replace("//", "/");
-    EpisodeSetup::open(&loaded, &episode_id(0, 1), &SceneChanges::default())
-        .map(|e| e.scene)
-        .map_err(|e| e.to_string().replace(&folder, ""))
-}
-
-#[test]
-fn start_values_are_those_given_or_zero() {
-    let add = |rest: &str| {
-        let place = format!("scene:add {{ name = 'chest', asset = chest, at = {{ 0.1, 0 }}, {rest} }}");
-        open(&suite(&chest(SLIDER, ""), &place)).map(|scene| scene.objects[0].joints.clone())
-    };
-    assert_eq!(add("joints = { drawer = 0.04 }"), Ok(vec![0.04]));
-    assert_eq!(add(""), Ok(vec![0.0]));
+    super::open(&loaded, &episode_id(0, 1)).map(|e| e.scene).map_err(|e| project.shorten(e))
 }
 
 #[test]

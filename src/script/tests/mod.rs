@@ -13,7 +13,7 @@ mod visuals;
 
 use std::{fs, path::PathBuf, sync::Arc, time::Duration};
 
-use super::{LoadedScript, ScriptError, VmLimits, load_with};
+use super::{EpisodeSetup, LoadedScript, SceneChanges, ScriptError, VmLimits, load_with};
 use softvt_common::episode_id::{EpisodeId, EpisodeSplit};
 
 /// An episode of the first task of the suite "test".
@@ -21,7 +21,10 @@ pub(super) fn episode_id(episode: u32, base_seed: u64) -> EpisodeId {
     EpisodeId { suite: "test".into(), task: 0, episode, base_seed, split: EpisodeSplit::Validation }
 }
 
-/// A temporary project folder.
+pub(super) fn open(loaded: &LoadedScript, id: &EpisodeId) -> Result<EpisodeSetup, ScriptError> {
+    EpisodeSetup::open(loaded, id, &SceneChanges::default())
+}
+
 pub(super) struct Project(tempfile::TempDir);
 
 impl Project {
@@ -57,8 +60,12 @@ impl Project {
 
     /// The message of a script that must fail, without the folder's name.
     pub(super) fn error(&self, path: &str, argv: &[&str]) -> String {
-        let folder = format!("{}/", self.0.path().display());
-        self.load(path, argv).expect_err("the script must fail").to_string().replace(&folder, "")
+        self.shorten(self.load(path, argv).expect_err("the script must fail"))
+    }
+
+    /// A message without the folder's name.
+    pub(super) fn shorten(&self, message: impl ToString) -> String {
+        message.to_string().replace(&format!("{}/", self.0.path().display()), "")
     }
 }
 
@@ -75,27 +82,9 @@ pub(super) fn limits() -> VmLimits {
     }
 }
 
-/// The message of a script of one file.
 pub(super) fn error_of(text: &str) -> String {
     Project::new(&[("suites/x.lua", text)]).error("suites/x.lua", &[])
 }
 
 /// The common part of a suite, to which a test adds its own.
-pub(super) const SUITE: &str = r#"local mat = softvt.asset { name = "mat", shape = softvt.shape.box { size = { 0.1, 0.1, 0.01 } }:grounded(), body = softvt.static {} }
-local ball = softvt.asset {
-  name = "ball", shape = softvt.shape.sphere { radius = 0.03 }:grounded(),
-  body = softvt.soft { youngs_pa = 40e3, poisson = 0.4, density = 200 },
-}
-local layout = softvt.layout("one", function(scene, rng)
-  scene:add { name = "ball", asset = ball, at = { rng:uniform(-0.02, 0.02), rng:uniform(-0.02, 0.02) } } scene:add{ name = "mat", asset = mat, at = { 0.3, 0 } }
-end)
-local function suite(expert, shifts)
-  return softvt.suite {
-    name = "test", object_type = "deformable", tasks_differ_in = "spatial", shifts = shifts,
-    tasks = { softvt.task {
-      prompt = "lift the ball", layout = layout, expert = expert,
-      goal = softvt.on { object = "ball", target = "mat" },
-    } },
-  }
-end
-"#;
+pub(super) const SUITE: &str = include_str!("lua/suite.lua");

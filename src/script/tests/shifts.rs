@@ -2,9 +2,9 @@
 
 use std::{path::Path, time::Duration};
 
-use crate::{EpisodeSetup, LoadedScript, SceneChanges, VmLimits, load_with};
+use crate::{EpisodeSetup, LoadedScript, SceneChanges, VmLimits, check_shift, load_with};
 use softvt_benchmark::{Plan, ShiftValue};
-use softvt_common::episode_id::{EpisodeId, EpisodeSplit};
+use softvt_common::episode_id::EpisodeId;
 use softvt_scene::{Body, Scene};
 
 fn loaded(suite: &str) -> LoadedScript {
@@ -15,13 +15,7 @@ fn loaded(suite: &str) -> LoadedScript {
 }
 
 fn episode(loaded: &LoadedScript, suite: &str, task: usize, shifts: &[(&str, f64)]) -> EpisodeSetup {
-    let id = EpisodeId {
-        suite: suite.to_owned(),
-        task,
-        episode: 3,
-        base_seed: 1,
-        split: EpisodeSplit::Validation,
-    };
+    let id = EpisodeId { suite: suite.to_owned(), task, ..super::episode_id(3, 1) };
     let shift = |(name, value): &(&str, f64)| ShiftValue { name: (*name).to_owned(), value: *value };
     let shifts: Vec<ShiftValue> = shifts.iter().map(shift).collect();
     EpisodeSetup::open(loaded, &id, &SceneChanges { shifts, ..SceneChanges::default() }).expect("a scene")
@@ -50,6 +44,9 @@ fn shifts_of_the_target_leave_all_other_objects() {
     let suite = loaded("spatial_soft");
     let Plan::Suite(plan) = &suite.plan else { panic!("a suite") };
     let target = plan.tasks[0].object.clone();
+    assert_eq!(check_shift(&plan.shifts, "mass", 2.0), Ok(()));
+    let refused = "shift mass: expected a number in 0.01..100 (1), got 0".to_owned();
+    assert_eq!(check_shift(&plan.shifts, "mass", 0.0), Err(refused));
     for (shift, factor) in [("target_mass", 2.5), ("target_stiffness", 0.5)] {
         let setup = episode(&suite, "spatial_soft", 0, &[(shift, factor)]);
         assert_eq!(multiplied(&setup, factor), std::slice::from_ref(&target), "{shift}");

@@ -25,7 +25,7 @@ fn script() -> String {
     let mut text = String::from("NAMES = {\n");
     for class in api::CLASSES {
         let methods = quoted(class.methods.iter().map(|method| method.name));
-        let fields = quoted(class.all_fields().map(|field| field.name));
+        let fields = quoted((class.fields)().iter().map(|field| field.name));
         let _ = writeln!(
             text,
             "  [{:?}] = {{ methods = {{ {methods} }}, fields = {{ {fields} }} }},",
@@ -60,11 +60,10 @@ fn wrong_calls_get_messages_in_terms_of_the_lua_interface() {
         crate::VmLimits { load: minute, call: minute, point: minute, memory_bytes: 128 << 20, ..limits() };
     let loaded = project.load_with("x.lua", &[], &limits).unwrap();
     let rows = Experiment::open(&loaded).unwrap().run(0).unwrap();
-    let folder = format!("{}/", project.path("").display()).replace("//", "/");
     let mut wrong = Vec::new();
     for row in &rows {
         let text = |key: &str| row[key].as_str().unwrap_or_default();
-        let (what, message) = (text("what"), text("message").replace(&folder, ""));
+        let (what, message) = (text("what"), project.shorten(text("message")));
         if ["seen", "enough"].contains(&what) {
             continue;
         }

@@ -1,9 +1,8 @@
 //! Scales of objects, and suites whose objects vary from episode to episode.
 
 use super::*;
-use crate::{EpisodeSetup, SceneChanges, load_variation};
+use crate::load_variation;
 use softvt_benchmark::Plan;
-use softvt_common::episode_id::{EpisodeId, EpisodeSplit};
 use softvt_evaluation::thresholds::ThresholdFile;
 use softvt_scene::{HiddenProperties, Object};
 
@@ -14,8 +13,7 @@ fn project(rest: &str) -> Project {
 }
 
 fn open(loaded: &LoadedScript, task: usize, episode: u32) -> Result<EpisodeSetup, ScriptError> {
-    let id = EpisodeId { suite: "test".into(), task, episode, base_seed: 3, split: EpisodeSplit::Validation };
-    EpisodeSetup::open(loaded, &id, &SceneChanges::default())
+    super::open(loaded, &EpisodeId { task, ..episode_id(episode, 3) })
 }
 
 fn opened(rest: &str) -> EpisodeSetup {
@@ -74,7 +72,7 @@ fn draws_cover_their_ranges_and_leave_places_alone() {
         let [varied, same] = [&loaded, &plain].map(|loaded| open(loaded, 0, episode).expect("an episode"));
         assert_eq!(object(&varied, "left").pose_w, object(&same, "left").pose_w);
         assert_eq!(same.variation, None);
-        assert_eq!(same.scene.lighting, plain_light());
+        assert_eq!(same.scene.lighting, softvt_scene::Lighting::default());
         let drawn = varied.variation.expect("varied");
         assert!((0.7..=1.4).contains(&drawn.light.strength));
         assert_eq!(
@@ -90,10 +88,6 @@ fn draws_cover_their_ranges_and_leave_places_alone() {
     assert!(sizes.iter().all(|x| (0.9..=1.1).contains(x)) && (mean(&sizes) - 1.0).abs() < 0.01);
     let product: Vec<f64> = stiffness.iter().zip(&sizes).map(|(a, b)| a * (b - 1.0)).collect();
     assert!(mean(&product).abs() < 0.01, "stiffness and size are independent");
-}
-
-fn plain_light() -> softvt_scene::Lighting {
-    softvt_scene::Lighting::default()
 }
 
 #[test]
@@ -122,7 +116,7 @@ fn the_standard_variation_applies_to_any_suite_of_soft_objects() {
     assert_eq!(setup.variation.expect("varied").objects.len(), 2);
     let Plan::Suite(suite) = &loaded.plan else { panic!("a suite") };
     assert_eq!(suite.vary.as_ref(), Some(&ranges));
-    let again = loaded.vary(&ranges).expect_err("it varies already").to_string();
+    let again = loaded.vary(&ranges).expect_err("it varies already");
     assert!(again.contains("suite test varies already"), "{again}");
 }
 
@@ -136,12 +130,15 @@ fn controllers_without_touch_suit_most_instances_of_a_sample() {
     project(BLIND_GRIPS).load_with("x.lua", &[], &limits).unwrap_or_else(|error| panic!("{error}"));
 }
 
-/// A suite of the calibrated sphere with hidden properties.
-const HIDDEN: &str = include_str!("lua/hidden_suite.lua");
+/// A suite of the calibrated sphere with hidden properties, after a `change` of its ranges.
+fn hidden(change: &str) -> Project {
+    let suite = include_str!("lua/hidden_suite.lua");
+    project(&format!("{suite} {change} return suite(placed(sphere), softvt.variation(ranges))"))
+}
 
 #[test]
 fn hidden_properties_change_material_limit_and_surface_within_the_window() {
-    let project = project(&format!("{HIDDEN} return suite(placed(sphere), softvt.variation(ranges))"));
+    let project = hidden("");
     let loaded = project.load("x.lua", &[]).expect("a suite");
     for episode in 0..20 {
         let setup = open(&loaded, 0, episode).expect("an episode");
@@ -163,20 +160,18 @@ fn hidden_properties_change_material_limit_and_surface_within_the_window() {
 #[test]
 fn size_and_looks_do_not_depend_on_what_is_hidden() {
     let drawn = |change: &str| {
-        let project =
-            project(&format!("{HIDDEN} {change} return suite(placed(sphere), softvt.variation(ranges))"));
-        let loaded = project.load("x.lua", &[]).expect("a suite");
+        let loaded = hidden(change).load("x.lua", &[]).expect("a suite");
         let setup = open(&loaded, 0, 7).expect("an episode");
         setup.variation.expect("varied").objects.into_values().collect::<Vec<_>>()
     };
-    let (hidden, plain) = (drawn(""), drawn("ranges.hidden = nil"));
-    for (one, other) in hidden.iter().zip(&plain) {
+    let (varied, plain) = (drawn(""), drawn("ranges.hidden = nil"));
+    for (one, other) in varied.iter().zip(&plain) {
         assert_eq!((one.scale, one.colour), (other.scale, other.colour));
     }
     assert!(plain.iter().all(|one| one.hidden.is_none()));
 }
 
-/// What does not show of each object of an episode, in the order of names.
+/// Hidden properties of the objects of an episode, in the order of names.
 fn hidden_of(setup: EpisodeSetup) -> Vec<HiddenProperties> {
     let objects = setup.variation.expect("varied").objects;
     objects.into_values().map(|drawn| drawn.hidden.expect("hidden")).collect()
@@ -184,7 +179,7 @@ fn hidden_of(setup: EpisodeSetup) -> Vec<HiddenProperties> {
 
 #[test]
 fn another_calibration_changes_the_stated_windows_and_no_draw() {
-    let project = project(&format!("{HIDDEN} return suite(placed(sphere), softvt.variation(ranges))"));
+    let project = hidden("");
     let drawn = || -> Vec<HiddenProperties> {
         let loaded = project.load("x.lua", &[]).expect("a suite");
         (0..5).flat_map(|episode| hidden_of(open(&loaded, 0, episode).expect("an episode"))).collect()
@@ -208,7 +203,7 @@ fn another_calibration_changes_the_stated_windows_and_no_draw() {
 
 #[test]
 fn instances_without_a_safe_grip_by_the_calibration_are_drawn() {
-    let project = project(&format!("{HIDDEN} return suite(placed(sphere), softvt.variation(ranges))"));
+    let project = hidden("");
     let path = "assets/calibration/sphere.json";
     let text = std::str::from_utf8(crate::embedded(path).expect("shipped")).expect("UTF-8");
     let mut file = ThresholdFile::parse(text, path).expect("a calibration");
@@ -229,7 +224,7 @@ fn the_hidden_suites_draw_the_published_instances() {
         let loaded = project.load_with("x.lua", &[], &limits).unwrap_or_else(|error| panic!("{error}"));
         let line = |task: usize| {
             let id = EpisodeId { suite: suite.to_owned(), task, ..episode_id(0, 0) };
-            let setup = EpisodeSetup::open(&loaded, &id, &SceneChanges::default()).expect("an episode");
+            let setup = super::open(&loaded, &id).expect("an episode");
             let properties = hidden_of(setup).into_iter().map(|one| {
                 let HiddenProperties { aeration, staling, filling, coating, draws, .. } = one;
                 format!("aeration {aeration:.3} staling {staling:.3} filling {filling:.3} coating {coating:.3} draws {draws}")

@@ -2,8 +2,7 @@
 
 use std::sync::Arc;
 
-use super::{Project, SUITE, episode_id};
-use crate::{EpisodeSetup, SceneChanges};
+use super::{Project, SUITE, episode_id, open};
 use softvt_scene::{Body, Mask, Visual};
 
 fn with_visuals(visuals: &str) -> String {
@@ -20,7 +19,7 @@ fn read(visuals: &str) -> Vec<Visual> {
     );
     let project = Project::new(&[("suites/x.lua", &(with_visuals(visuals) + &text + "\nreturn suite()"))]);
     let loaded = project.load("suites/x.lua", &[]).unwrap();
-    let scene = EpisodeSetup::open(&loaded, &episode_id(0, 0), &SceneChanges::default()).unwrap().scene;
+    let scene = open(&loaded, &episode_id(0, 0)).unwrap().scene;
     assert_eq!(scene.objects[0].asset.body, Body::Scenery);
     scene.objects[0].asset.visuals.clone()
 }
@@ -49,42 +48,4 @@ fn layers_reach_the_scene_as_they_are_written() {
     let masks = masks.into_iter().map(Arc::new).collect();
     assert_eq!(both.mask, Mask::Product { masks });
     assert_eq!((&whole.mask, whole.opacity), (&Mask::Whole, 1.0));
-}
-
-#[test]
-fn every_mask_can_be_made_from_lua() {
-    let masks = [
-        "checker { size_m = 0.01 }",
-        "stripes { axis = { 1, 1, 0 }, pitch_m = 0.01 }",
-        "gradient { axis = 'y', from_m = 0.02, to_m = 0.01 }",
-        "noise { size_m = { 0.01, 0.02, 0.03 } }",
-        "rings { centre_m = { 0, 0, 0 }, pitch_m = 0.01 }",
-        "boards { length_m = 0.5, width_m = 0.1 }",
-        "seams { length_m = 0.5, width_m = 0.1, gap_m = 1e-3 }",
-        "specks { spacing_m = 0.01, radius_m = 1e-3 }",
-        "weave { pitch_m = 1e-3 }",
-        "facing { from = 0.2, to = 0.8 }",
-        "inside { shape = softvt.shape.sphere { radius = 0.01 }, soft_m = 1e-3 }",
-        "text { text = 'Ünder', height_m = 5e-3, at = { 0, 0, 0.03 }, facing = '-y', wrap_m = 0.03, weight = 0.1, font = 'mono' }",
-    ];
-    assert_eq!(masks.len(), crate::api::visuals::MASKS.len());
-    let layers: Vec<_> =
-        masks.iter().map(|m| format!("{{ albedo = {{ 0, 0, 0 }}, mask = mask.{m} }}")).collect();
-    let visuals = read(&format!("{{ {{ albedo = {{ 1, 1, 1 }}, layers = {{ {} }} }} }}", layers.join(", ")));
-    assert_eq!(visuals[0].layers.len(), masks.len());
-}
-
-#[test]
-fn every_material_of_the_library_is_a_visual() {
-    let names =
-        "crust dough frosting foam silicone seeds ceramic wood floorboards steel fabric paint".split(' ');
-    let looks: Vec<String> = names.map(|name| format!("material.{name} {{}}")).collect();
-    let visuals = read(&format!(
-        "(function() local material = require 'materials'\n\
-         local count = 0 for name in pairs(material) do count = count + 1 end assert(count == 13)\n\
-         return {{ {}, material.floured(material.crust {{}}, {{}}) }} end)()",
-        looks.join(", ")
-    ));
-    assert!(visuals.iter().all(|visual| !visual.layers.is_empty()));
-    assert_eq!(visuals.len(), 13);
 }

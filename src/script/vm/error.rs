@@ -4,13 +4,21 @@ use std::fmt;
 
 use mlua::{Lua, debug::Debug};
 
-use super::library::embedded;
+use super::{VmState, library::embedded};
+use softvt_common::parallel::lock;
 
-/// A line of a script.
+/// An error with a formatted message at the line that is running; see [`fail`].
+macro_rules! fail {
+    ($lua:expr, $($message:tt)+) => { $crate::vm::error::fail($lua, format_args!($($message)+)) };
+}
+
+macro_rules! bail {
+    ($lua:expr, $($message:tt)+) => { return Err(fail!($lua, $($message)+)) };
+}
+
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) struct SourceLine {
     pub file: String,
-    /// From 1.
     pub line: usize,
 }
 
@@ -31,17 +39,21 @@ impl SourceLine {
 /// An error in a script or in its use; always names the file.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ScriptError {
-    /// A lower-case fragment.
     pub message: String,
     /// The file, as the user names it.
     pub file: String,
     /// Line in the file, from 1, where known.
     pub line: Option<usize>,
-    /// Suggestion for a fix.
     pub hint: Option<String>,
 }
 
 impl std::error::Error for ScriptError {}
+
+impl From<ScriptError> for mlua::Error {
+    fn from(error: ScriptError) -> Self {
+        Self::external(error)
+    }
+}
 
 impl fmt::Display for ScriptError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -58,7 +70,6 @@ impl fmt::Display for ScriptError {
 }
 
 impl ScriptError {
-    /// An error about `file` as a whole.
     pub fn new(file: impl Into<String>, message: impl Into<String>) -> Self {
         Self { message: message.into(), file: file.into(), line: None, hint: None }
     }
@@ -69,7 +80,6 @@ impl ScriptError {
         self
     }
 
-    /// The same error at a line, if that is known.
     pub(crate) fn at(mut self, place: Option<SourceLine>) -> Self {
         if let Some(SourceLine { file, line }) = place {
             (self.file, self.line) = (file, Some(line));
@@ -85,20 +95,9 @@ pub(crate) struct RaisedObject {
     pub place: Option<SourceLine>,
 }
 
-/// Translates errors of the virtual machine.
-pub(crate) struct ErrorTranslator<'a> {
-    /// The main file.
-    pub main: &'a str,
-    /// Every loaded file.
-    pub files: &'a [String],
-    pub raised: Option<RaisedObject>,
-    /// Memory limit, bytes.
-    pub memory_bytes: usize,
-}
-
-impl ErrorTranslator<'_> {
+impl VmState {
     /// The error as a script author should read it: file, line and message, without the machine's internals.
-    pub(crate) fn explain(&self, error: &mlua::Error) -> ScriptError {
+    pub(super) fn translate(&self, error: &mlua::Error) -> ScriptError {
         let trace = match error {
             mlua::Error::CallbackError { traceback, .. } => traceback.as_str(),
             _ => "",
@@ -108,12 +107,12 @@ impl ErrorTranslator<'_> {
                 raised.clone()
             }
             mlua::Error::MemoryError(_) => {
-                let mib = self.memory_bytes >> 20;
+                let mib = self.limits.memory_bytes >> 20;
                 self.traced(format!("the script used more than its {mib} MiB of memory"), trace)
                     .hint("build smaller tables and strings, or keep fewer of them")
             }
             mlua::Error::SyntaxError { message, .. } => self.located("syntax error: ", message, ""),
-            mlua::Error::RuntimeError(message) if is_address(message) => match &self.raised {
+            mlua::Error::RuntimeError(message) if is_address(message) => match &*lock(&self.raised) {
                 Some(RaisedObject { description, place }) => {
                     self.traced(format!("error object {description}"), trace).at(place.clone())
                 }
@@ -137,13 +136,13 @@ impl ErrorTranslator<'_> {
         {
             text = rest;
         }
-        ScriptError::new(self.main, format!("{prefix}{}", text.trim())).at(Some(place))
+        ScriptError::new(self.main.as_str(), format!("{prefix}{}", text.trim())).at(Some(place))
     }
 
     /// An error without a position of its own gets that of the innermost loaded file in the traceback.
     fn traced(&self, message: String, trace: &str) -> ScriptError {
         let place = trace.lines().find_map(|frame| self.split_position(frame.trim()));
-        ScriptError::new(self.main, message).at(place.map(|(place, _)| place))
+        ScriptError::new(self.main.as_str(), message).at(place.map(|(place, _)| place))
     }
 
     /// Splits `file:line: rest` if the file is a loaded one.
@@ -162,7 +161,7 @@ impl ErrorTranslator<'_> {
             Some(tail) => file.ends_with(tail),
             None => *file == name,
         };
-        self.files.iter().find(is_file).cloned()
+        lock(&self.library).bundle.files.keys().find(is_file).cloned()
     }
 }
 
@@ -259,53 +258,12 @@ pub(crate) fn placed(error: mlua::Error, place: Option<SourceLine>) -> mlua::Err
 }
 
 /// An error at the line that is running: the author's, if the library was called from there.
-pub(crate) fn fail(lua: &Lua, message: impl Into<String>) -> mlua::Error {
+pub(crate) fn fail(lua: &Lua, message: impl fmt::Display) -> mlua::Error {
     fail_at(lua, own_line(lua).or_else(|| current_line(lua)), message)
 }
 
 /// An error at a line, or about the main file if the line is unknown.
-pub(crate) fn fail_at(lua: &Lua, place: Option<SourceLine>, message: impl Into<String>) -> mlua::Error {
+pub(crate) fn fail_at(lua: &Lua, place: Option<SourceLine>, message: impl fmt::Display) -> mlua::Error {
     let main = app_data::<MainFile>(lua).map_or("script".into(), |main| main.0);
-    mlua::Error::external(ScriptError::new(main, message).at(place))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn explain(error: mlua::Error) -> String {
-        let files = ["suites/x.lua".to_string(), "/a/very/long/way/down/lib.lua".to_string()];
-        let translator =
-            ErrorTranslator { main: "suites/x.lua", files: &files, raised: None, memory_bytes: 1 << 20 };
-        translator.explain(&error).to_string()
-    }
-
-    #[test]
-    fn runtime_errors_keep_their_position_and_lose_their_traceback() {
-        let raw = "suites/x.lua:3: attempt to index a nil value\nstack traceback:\n\t[C]: in ?";
-        assert_eq!(
-            explain(mlua::Error::RuntimeError(raw.into())),
-            "suites/x.lua:3: attempt to index a nil value"
-        );
-    }
-
-    #[test]
-    fn shortened_file_names_are_restored() {
-        let raw = "...way/down/lib.lua:7: oh";
-        assert_eq!(explain(mlua::Error::RuntimeError(raw.into())), "/a/very/long/way/down/lib.lua:7: oh");
-    }
-
-    #[test]
-    fn repeated_positions_are_shown_once() {
-        let raw = "suites/x.lua:3: suites/x.lua:3: suites/x.lua:3: oh";
-        assert_eq!(explain(mlua::Error::RuntimeError(raw.into())), "suites/x.lua:3: oh");
-        let raw = "suites/x.lua:3: suites/x.lua:5: oh";
-        assert_eq!(explain(mlua::Error::RuntimeError(raw.into())), raw);
-    }
-
-    #[test]
-    fn errors_without_position_are_placed_by_the_traceback() {
-        let raw = "oh\nstack traceback:\n\t[C]: in ?\n\tsuites/x.lua:9: in main chunk";
-        assert_eq!(explain(mlua::Error::RuntimeError(raw.into())), "suites/x.lua:9: oh");
-    }
+    mlua::Error::external(ScriptError::new(main, message.to_string()).at(place))
 }

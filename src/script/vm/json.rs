@@ -5,12 +5,10 @@ use serde::de::DeserializeOwned;
 use serde_json::{Number, Value as Json};
 
 use super::{
-    error::fail,
     list::plain,
     value::{describe, sorted_pairs},
 };
 
-/// Nesting depth of tables.
 const MAX_DEPTH: usize = 32;
 /// Values in one piece of data. A table that occurs several times counts each time, since it is copied.
 const MAX_VALUES: usize = 1_000_000;
@@ -18,9 +16,6 @@ const MAX_VALUES: usize = 1_000_000;
 const MAX_TEXT_BYTES: usize = 64 << 20;
 
 /// Converts a Lua value to JSON with sorted keys. Messages name the value as `label`.
-///
-/// # Errors
-/// For values that are not data: functions, objects, non-finite numbers, keys that are not strings, endless tables.
 pub(crate) fn to_json(lua: &Lua, value: &Value, label: &str) -> mlua::Result<Json> {
     read(lua, value, label, 0, &mut DataSize::default())
 }
@@ -44,7 +39,7 @@ pub(crate) fn deserialize<T: DeserializeOwned>(lua: &Lua, label: &str, value: &V
             Some((before, _)) => format!("{before}expected a table"),
             None => text,
         };
-        fail(lua, format!("{label}: {text}"))
+        fail!(lua, "{label}: {text}")
     })
 }
 
@@ -71,7 +66,7 @@ struct DataSize {
 }
 
 fn read(lua: &Lua, value: &Value, label: &str, depth: usize, size: &mut DataSize) -> mlua::Result<Json> {
-    let wrong = |message: String| fail(lua, format!("{label}: {message}"));
+    let wrong = |message: String| fail!(lua, "{label}: {message}");
     if size.values == MAX_VALUES {
         return Err(wrong(format!("the data has more than {MAX_VALUES} values; give less")));
     }

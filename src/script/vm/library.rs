@@ -57,7 +57,6 @@ pub struct ScriptFiles {
     pub files: BTreeMap<String, Arc<[u8]>>,
     /// The file found for each module or data file that was requested.
     pub served: BTreeMap<String, String>,
-    /// Data files that were requested and not found.
     pub absent: BTreeSet<String>,
     /// Messages about the modules and data files that could not be used. An episode repeats them, so that a script
     /// cannot tell an episode from the run that made its plan.
@@ -76,39 +75,16 @@ impl ScriptFiles {
 /// A module or data file cannot be used. The text is a fragment without a position.
 #[derive(Debug, thiserror::Error)]
 pub(crate) enum LibraryError {
-    #[error(
-        "require {0:?}: a module is named by words joined with dots, such as \"experts.pick_place\", \
-         and lies inside the project; paths are refused"
-    )]
-    ModuleName(String),
-    #[error(
-        "require {0:?}: the module was not loaded when the plan was made; require it at the top of the file"
-    )]
-    LateModule(String),
-    #[error("require {module:?}: no {path} in {roots} nor in the standard library{suggestion}")]
-    NoModule { module: String, path: String, roots: String, suggestion: String },
-    #[error("require {module:?}: {source}")]
-    Module { module: String, source: Box<LibraryError> },
-    #[error("{0:?} leads out of the project; give a path inside of it without \"..\"")]
-    OutsidePath(String),
-    #[error("{path:?} was not read when the plan was made; {hint}")]
-    LateFile { path: String, hint: &'static str },
-    #[error("no file {path:?} {searched}")]
-    NoFile { path: String, searched: String },
-    #[error("{0} is a link that leads out of the project")]
-    OutsideLink(String),
-    #[error("{file}: {source}")]
-    Read { file: String, source: io::Error },
     #[error("{0}")]
-    Again(String),
-    #[error("{request:?}: more than {MAX_REFUSED} modules and files were requested that are not there")]
-    TooMany { request: String },
+    Late(String),
+    #[error("{0}")]
+    Missing(String),
+    #[error("{0}")]
+    Refused(String),
 }
 
-/// A file that was found.
 #[derive(Clone, Debug)]
 pub(crate) struct FoundFile {
-    /// Name in messages.
     pub name: String,
     pub bytes: Arc<[u8]>,
 }
@@ -116,7 +92,6 @@ pub(crate) struct FoundFile {
 /// The library that a virtual machine reads from.
 pub(crate) type SharedLibrary = Arc<Mutex<Library>>;
 
-/// Finds files and keeps what it read.
 #[derive(Debug)]
 pub(crate) struct Library {
     roots: Vec<PathBuf>,
@@ -145,7 +120,6 @@ impl Library {
         Self { roots: Vec::new(), main: PathBuf::new(), bundle, is_frozen: true }
     }
 
-    /// Text of a file that was read before.
     pub(crate) fn text(&self, file: &str) -> Result<String, ScriptError> {
         match self.bundle.files.get(file) {
             Some(bytes) => lua_text(file, bytes),
@@ -153,7 +127,6 @@ impl Library {
         }
     }
 
-    /// Finds the file of a module (`experts.pick_place`).
     pub(crate) fn module(&mut self, module: &str) -> Result<FoundFile, LibraryError> {
         self.repeatable(module, |library| library.find_module(module))
     }
@@ -165,10 +138,13 @@ impl Library {
         find: impl FnOnce(&mut Self) -> Result<T, LibraryError>,
     ) -> Result<T, LibraryError> {
         if let Some(message) = self.bundle.refused.get(key) {
-            return Err(LibraryError::Again(message.clone()));
+            return Err(LibraryError::Refused(message.clone()));
         }
         if self.bundle.refused.len() >= MAX_REFUSED && !self.bundle.served.contains_key(key) {
-            return Err(LibraryError::TooMany { request: key.into() });
+            let many = format!(
+                "{key:?}: more than {MAX_REFUSED} modules and files were requested that are not there"
+            );
+            return Err(LibraryError::Refused(many));
         }
         let found = find(self);
         if let Err(error) = &found
@@ -183,30 +159,26 @@ impl Library {
         let is_plain = |part: &str| {
             !part.is_empty() && part.bytes().all(|b| b.is_ascii_alphanumeric() || b == b'_' || b == b'-')
         };
+        let refused = |message: String| LibraryError::Refused(format!("require {module:?}: {message}"));
         if !module.split('.').all(is_plain) {
-            return Err(LibraryError::ModuleName(module.into()));
+            return Err(refused(
+                "a module is named by words joined with dots, such as \"experts.pick_place\", and lies inside the \
+                 project; paths are refused"
+                    .to_owned(),
+            ));
         }
         let path = format!("{}.lua", module.replace('.', "/"));
         let candidates = [format!("scripts/{path}"), format!("suites/{path}"), path.clone()];
-        let late = || LibraryError::LateModule(module.into());
-        match self.find(module, None, &candidates, late) {
-            Ok(Some(file)) => Ok(file),
-            Ok(None) => {
-                let mut names: Vec<String> =
-                    ["scripts", "suites", "assets"].into_iter().flat_map(module_names).collect();
-                names.extend(self.modules_beside(&path));
-                let close = suggest(module, names.iter().map(String::as_str));
-                let suggestion = close.map_or(String::new(), |close| format!("; did you mean {close:?}?"));
-                Err(LibraryError::NoModule {
-                    module: module.into(),
-                    path,
-                    roots: self.root_names(),
-                    suggestion,
-                })
-            }
-            Err(late @ LibraryError::LateModule(_)) => Err(late),
-            Err(source) => Err(LibraryError::Module { module: module.into(), source: source.into() }),
-        }
+        let found = self.find(module, None, &candidates, "require it at the top of the file");
+        found.map_err(|error| refused(error.to_string()))?.ok_or_else(|| {
+            let mut names: Vec<String> =
+                ["scripts", "suites", "assets"].into_iter().flat_map(module_names).collect();
+            names.extend(self.modules_beside(&path));
+            let close = suggest(module, names.iter().map(String::as_str));
+            let suggestion = close.map_or(String::new(), |close| format!("; did you mean {close:?}?"));
+            let roots = self.root_names();
+            refused(format!("no {path} in {roots} nor in the standard library{suggestion}"))
+        })
     }
 
     /// True if a module has limits or materials of objects: by its path, and by its content, since a link or a copy
@@ -243,26 +215,21 @@ impl Library {
 
     /// Finds a data file (a mesh) by its relative path: next to the Lua file `requester` first, then below the roots.
     pub(crate) fn data(&mut self, path: &str, requester: Option<&str>) -> Result<FoundFile, LibraryError> {
-        let is_inside =
-            |part: &str| !part.is_empty() && part != "." && part != ".." && !part.contains(['\\', '\0', ':']);
-        if !path.split('/').all(is_inside) {
-            return Err(LibraryError::OutsidePath(path.into()));
+        if !is_inside(path) {
+            let message =
+                format!("{path:?} leads out of the project; give a path inside of it without \"..\"");
+            return Err(LibraryError::Refused(message));
         }
         let folder = requester.map(|file| file.rsplit_once('/').map_or("", |(folder, _)| folder));
         let sibling =
             folder.map(|folder| if folder.is_empty() { path.to_owned() } else { format!("{folder}/{path}") });
         // No path holds a colon, so one folder's file is never taken for another's.
         let key = format!("{}:{path}", folder.unwrap_or_default());
-        let hint = "build the shape in the file itself";
-        let late = || LibraryError::LateFile { path: path.into(), hint };
         self.repeatable(&key, |library| {
-            let found = library.find(&key, sibling, &[path.to_string()], late)?;
-            found.ok_or_else(|| {
-                let searched = match requester {
-                    Some(requester) => format!("next to {requester}, nor in {}", library.root_names()),
-                    None => format!("in {}", library.root_names()),
-                };
-                LibraryError::NoFile { path: path.into(), searched }
+            let hint = "build the shape in the file itself";
+            library.find(&key, sibling, &[path.to_string()], hint)?.ok_or_else(|| {
+                let next_to = requester.map_or(String::new(), |file| format!("next to {file}, nor "));
+                LibraryError::Missing(format!("no file {path:?} {next_to}in {}", library.root_names()))
             })
         })
     }
@@ -272,8 +239,8 @@ impl Library {
         if self.bundle.absent.contains(path) {
             return Ok(None);
         }
-        let late = || LibraryError::LateFile { path: path.into(), hint: "request it at the top of the file" };
-        let found = self.repeatable(path, |library| library.find(path, None, &[path.to_string()], late))?;
+        let hint = "request it at the top of the file";
+        let found = self.repeatable(path, |library| library.find(path, None, &[path.to_string()], hint))?;
         if found.is_none() {
             self.bundle.absent.insert(path.to_string());
         }
@@ -281,20 +248,21 @@ impl Library {
     }
 
     /// Finds the file of `key`: at the path `first`, else at the first of `candidates` below the roots, on disk or
-    /// embedded. `late` is the error of a frozen library for a file that was not read before.
+    /// embedded. `hint` is the advice for a file that a frozen library has not read before.
     fn find(
         &mut self,
         key: &str,
         first: Option<String>,
         candidates: &[String],
-        late: impl FnOnce() -> LibraryError,
+        hint: &str,
     ) -> Result<Option<FoundFile>, LibraryError> {
         if let Some(name) = self.bundle.served.get(key) {
             let bytes = self.bundle.files.get(name).cloned().unwrap_or_default();
             return Ok(Some(FoundFile { name: name.clone(), bytes }));
         }
         if self.is_frozen {
-            return Err(late());
+            let path = candidates.last().map_or(key, String::as_str);
+            return Err(LibraryError::Late(format!("{path:?} was not read when the plan was made; {hint}")));
         }
         // The order of candidates counts more than that of roots: require "shifts" means scripts/shifts.lua, though
         // suites/shifts.lua may be nearer. A main file is never taken for the module of its name, which it may require.
@@ -319,11 +287,12 @@ impl Library {
 
     /// Reads a file unless it is a link that leads out of the roots.
     fn read_inside(&self, path: &Path) -> Result<Vec<u8>, LibraryError> {
-        let error = |source| LibraryError::Read { file: display(path), source };
+        let error = |error: io::Error| LibraryError::Refused(format!("{}: {error}", display(path)));
         let real = path.canonicalize().map_err(error)?;
         let is_inside = |root: &PathBuf| root.canonicalize().is_ok_and(|root| real.starts_with(root));
         if !self.roots.iter().any(is_inside) {
-            return Err(LibraryError::OutsideLink(display(path)));
+            let message = format!("{} is a link that leads out of the project", display(path));
+            return Err(LibraryError::Refused(message));
         }
         read(path).map_err(error)
     }
@@ -347,6 +316,11 @@ impl Library {
         let names: Vec<_> = self.roots.iter().map(|root| format!("{:?}", display(root))).collect();
         names.join(", ")
     }
+}
+
+/// True for a relative path with forward slashes that leads into its folder.
+pub(crate) fn is_inside(path: &str) -> bool {
+    path.split('/').all(|part| !matches!(part, "" | "." | "..") && !part.contains(['\\', '\0', ':']))
 }
 
 /// The folder of a path; `.` if the path has none.
@@ -414,19 +388,11 @@ fn missing(main: &Path, name: &str) -> ScriptError {
     known.extend(entries.map(|e| display(&e.path())).filter(|n| is_script(n)));
     let error = ScriptError::new(name, "no such file");
     // Folders and endings are alike, and would make distant names close.
-    let stem = |path: &str| {
-        Path::new(path).file_stem().and_then(|stem| stem.to_str()).unwrap_or_default().to_owned()
-    };
-    let stems: Vec<String> = known.iter().map(|path| stem(path)).collect();
-    let close_stem = suggest(&stem(name), stems.iter().map(String::as_str));
+    let stem = |path: &str| Path::new(path).file_stem().map(|stem| stem.to_string_lossy().into_owned());
+    let stems: Vec<String> = known.iter().filter_map(|path| stem(path)).collect();
+    let close = suggest(&stem(name).unwrap_or_default(), stems.iter().map(String::as_str));
     // Of several, that of the suites.
-    let close = known
-        .iter()
-        .zip(&stems)
-        .filter(|(_, stem)| Some(stem.as_str()) == close_stem)
-        .map(|(path, _)| path)
-        .max();
-    match close {
+    match close.and_then(|close| known.iter().filter(|path| stem(path).as_deref() == Some(close)).max()) {
         Some(close) => error.hint(format!("did you mean {close}?")),
         None => error.hint("give the path of a Lua file; the standard suites are in suites/"),
     }

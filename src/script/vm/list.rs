@@ -3,10 +3,7 @@
 
 use mlua::{Lua, MetaMethod, MultiValue, Table, UserData, UserDataFields, UserDataMethods, Value};
 
-use super::{
-    error::fail,
-    value::{describe, literal, number},
-};
+use super::value::{describe, literal, number};
 
 type Get = Box<dyn Fn(&Lua) -> mlua::Result<Vec<f64>> + Send + Sync>;
 type Set = Box<dyn Fn(&Lua, &Value) -> mlua::Result<()> + Send + Sync>;
@@ -18,7 +15,6 @@ enum ListContent {
     ReadOnly { entries: Table, hint: &'static str },
 }
 
-/// `softvt.List`.
 pub(crate) struct LuaList {
     /// Name in messages: `scene.base`.
     label: String,
@@ -26,7 +22,6 @@ pub(crate) struct LuaList {
 }
 
 impl LuaList {
-    /// Class name in Lua.
     pub(crate) const CLASS: &'static str = "softvt.List";
 
     /// Numbers read by `get`; `set` writes all of them.
@@ -39,7 +34,6 @@ impl LuaList {
         Self { label, content: ListContent::ReadOnly { entries, hint } }
     }
 
-    /// Its entries as a plain list.
     fn entries(&self, lua: &Lua) -> mlua::Result<Table> {
         match &self.content {
             ListContent::Live { get, .. } => lua.create_sequence_from(get(lua)?),
@@ -52,14 +46,7 @@ impl LuaList {
     fn read(&self, lua: &Lua, key: &Value) -> mlua::Result<Value> {
         match key {
             Value::Integer(_) | Value::Number(_) => self.entries(lua)?.raw_get(key),
-            other => {
-                let message = format!(
-                    "{}: expected a place in the list, 1 or more, got {}",
-                    self.label,
-                    describe(other)
-                );
-                Err(fail(lua, message))
-            }
+            other => Err(fail!(lua, "{}: expected a place in the list, got {}", self.label, describe(other))),
         }
     }
 
@@ -68,17 +55,17 @@ impl LuaList {
         let (get, set) = match &self.content {
             ListContent::Live { get, set } => (get, set),
             ListContent::ReadOnly { hint, .. } => {
-                return Err(fail(lua, format!("{label}: cannot be written; {hint}")));
+                bail!(lua, "{label}: cannot be written; {hint}");
             }
         };
         let mut numbers = get(lua)?;
         let count = numbers.len();
         let place = number(key).filter(|n| n.fract() == 0.0 && (1.0..=count as f64).contains(n));
         let Some(place) = place else {
-            return Err(fail(lua, format!("{label}: has places 1 to {count}, got {}", describe(key))));
+            bail!(lua, "{label}: has places 1 to {count}, got {}", describe(key));
         };
         let Some(entry) = number(value).filter(|number| number.is_finite()) else {
-            return Err(fail(lua, format!("{label}[{place}]: expected a number, got {}", describe(value))));
+            bail!(lua, "{label}[{place}]: expected a number, got {}", describe(value));
         };
         numbers[place as usize - 1] = entry;
         set(lua, &Value::Table(lua.create_sequence_from(numbers)?))

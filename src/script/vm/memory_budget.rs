@@ -7,7 +7,7 @@ use std::sync::{
 
 use mlua::Lua;
 
-use super::error::{app_data, fail};
+use super::error::app_data;
 
 /// Bytes that the images and shapes of one virtual machine may take together, and one more while it is made. Masks are
 /// small: Lua's own limit suffices.
@@ -36,18 +36,12 @@ impl Drop for Reservation {
 }
 
 /// Reserves `bytes` for an image or shape. If they do not fit, garbage is collected first.
-///
-/// # Errors
-/// If the budget is used up, at the script's line.
 pub(crate) fn reserve(lua: &Lua, bytes: usize) -> mlua::Result<Reservation> {
     let used = app_data::<MemoryUse>(lua)?.objects;
     reserve_within(MAX_OBJECT_BYTES, used, lua, bytes, "images and shapes; keep fewer or smaller ones")
 }
 
 /// Reserves `bytes` for the content of a world, as [`reserve`] does.
-///
-/// # Errors
-/// As [`reserve`].
 pub(crate) fn reserve_in_world(lua: &Lua, bytes: usize) -> mlua::Result<Reservation> {
     let used = app_data::<MemoryUse>(lua)?.worlds;
     let objects = "worlds and simulations; keep fewer, or give bodies a lower resolution";
@@ -67,7 +61,7 @@ fn reserve_within(
         lua.gc_collect()?;
     }
     if !fits() {
-        return Err(fail(lua, format!("the script holds more than {} MiB of {objects}", limit >> 20)));
+        bail!(lua, "the script holds more than {} MiB of {objects}", limit >> 20);
     }
     used.fetch_add(bytes, Ordering::Relaxed);
     Ok(Reservation { used, bytes })

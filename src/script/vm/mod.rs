@@ -1,5 +1,6 @@
 //! A sandboxed virtual machine: what a script may reach, and how much memory and time it may use.
 
+#[macro_use]
 pub(crate) mod error;
 pub(crate) mod json;
 pub(crate) mod library;
@@ -25,12 +26,12 @@ use mlua::{
 };
 use rand_chacha::{ChaCha8Rng, rand_core::RngCore};
 
-use error::{ErrorTranslator, MainFile, RaisedObject, ScriptError, app_data, current_line, fail};
+use error::{MainFile, RaisedObject, ScriptError, app_data, current_line, fail};
 use library::{Library, SharedLibrary, lua_text};
 use memory_budget::MemoryUse;
 use privilege::{PrivilegedAccess, check_module};
 use value::{describe, literal, sorted_pairs};
-use watchdog::{Clock, Deadline, StuckHandler};
+use watchdog::{Clock, ClockGuard, StuckHandler};
 
 use softvt_benchmark::seed;
 use softvt_common::{
@@ -41,19 +42,14 @@ use softvt_common::{
 /// Bytes that a virtual machine may print; later output is dropped.
 const MAX_PRINTED_BYTES: usize = 1 << 20;
 
-/// Largest text that `load` compiles, bytes.
-const MAX_CHUNK_BYTES: usize = 1 << 20;
-
 /// Registry key of the base library as it was before scripts could change it.
 const BASE_LIBRARY: &str = "softvt base library";
 
 /// Destination of `print`: not standard output, which belongs to results.
 pub type PrintSink = Arc<dyn Fn(&str) + Send + Sync>;
 
-/// Resources of one virtual machine.
 #[derive(Clone)]
 pub struct VmLimits {
-    /// Memory of Lua values, bytes.
     pub memory_bytes: usize,
     /// Lua time to load a script and make its plan.
     pub load: Duration,
@@ -64,9 +60,7 @@ pub struct VmLimits {
     pub point: Duration,
     /// Time after a limit during which the script may still stop by itself before it counts as stuck.
     pub grace: Duration,
-    /// Called if a library function does not return.
     pub on_stuck: StuckHandler,
-    /// Receives what scripts print.
     pub print: PrintSink,
 }
 
@@ -109,7 +103,6 @@ fn undefined_variable(message: &str) -> Option<&str> {
     message.strip_prefix("the variable \"")?.strip_suffix("\" is not defined")
 }
 
-/// State that the callbacks of a virtual machine share.
 struct VmState {
     main: String,
     library: SharedLibrary,
@@ -122,10 +115,7 @@ struct VmState {
 impl VmState {
     /// Translates an error of the virtual machine for the author of the script.
     fn explain(&self, error: &mlua::Error) -> ScriptError {
-        let files: Vec<String> = lock(&self.library).bundle.files.keys().cloned().collect();
-        let raised = lock(&self.raised).clone();
-        let memory_bytes = self.limits.memory_bytes;
-        let error = ErrorTranslator { main: &self.main, files: &files, raised, memory_bytes }.explain(error);
+        let error = self.translate(error);
         if let Some(name) = undefined_variable(&error.message).filter(|name| UNAVAILABLE.contains(name)) {
             let message =
                 format!("{name} is not available to scripts, which reach neither files nor the clock");
@@ -149,7 +139,6 @@ impl VmState {
     }
 }
 
-/// A sandboxed virtual machine.
 pub(crate) struct Vm {
     pub lua: Lua,
     pub random: MathRandom,
@@ -198,7 +187,6 @@ impl Vm {
         let tostring: Function = globals.get("tostring")?;
         globals.set("print", lua.create_function(move |lua, values| print(lua, &tostring, values))?)?;
         store_base_library(&lua)?;
-        globals.set("load", lua.create_function(load)?)?;
         let loaded = lua.create_table()?;
         globals.set("require", lua.create_function(move |lua, name| require(lua, &loaded, &name))?)?;
         let random = MathRandom::install(&lua)?;
@@ -208,12 +196,10 @@ impl Vm {
         Ok(Self { lua, clock, random, library: library.clone(), privilege, state: state.clone(), api })
     }
 
-    /// The main file, as messages name it.
     pub(crate) fn main(&self) -> &str {
         &self.state.main
     }
 
-    /// Runs the main file and returns its first result.
     pub(crate) fn run_main(&self) -> Result<Option<Value>, ScriptError> {
         let main = self.main();
         let text = lock(&self.library).text(main)?;
@@ -234,13 +220,11 @@ impl Vm {
         function.call(args).map_err(|e| self.explain(&e))
     }
 
-    /// Starts the time of one call.
-    pub(crate) fn call_deadline(&self) -> Deadline {
+    pub(crate) fn call_deadline(&self) -> ClockGuard {
         self.clock.start(self.state.limits.call)
     }
 
-    /// Starts the time of one point of an experiment.
-    pub(crate) fn point_deadline(&self) -> Deadline {
+    pub(crate) fn point_deadline(&self) -> ClockGuard {
         self.clock.start(self.state.limits.point)
     }
 
@@ -281,7 +265,7 @@ fn remove_unsafe_functions(lua: &Lua) -> mlua::Result<()> {
 fn refuse_undefined_variables(lua: &Lua) -> mlua::Result<()> {
     let refuse = lua.create_function(|lua, (_, name): (Value, Value)| -> mlua::Result<Value> {
         let name = name.as_string().map_or_else(|| describe(&name), |name| name.to_string_lossy());
-        Err(fail(lua, format!("the variable {name:?} is not defined")))
+        Err(fail!(lua, "the variable {name:?} is not defined"))
     })?;
     let meta = lua.create_table()?;
     meta.set("__index", refuse)?;
@@ -318,72 +302,14 @@ fn print(lua: &Lua, tostring: &Function, values: MultiValue) -> mlua::Result<()>
         state.printable.store(left - line.len() - 1, Ordering::Relaxed);
         (state.limits.print)(&line);
     } else if state.printable.swap(0, Ordering::Relaxed) > 0 {
-        (state.limits.print)(&format!(
-            "… the script prints more than {} MiB; the rest is left out",
-            MAX_PRINTED_BYTES >> 20
-        ));
+        (state.limits.print)("… the script prints more than 1 MiB; the rest is left out");
     }
     Ok(())
 }
 
-/// `load(chunk [, name [, mode [, env]]])` for text alone; as in Lua, a bad chunk gives nil and the message.
-fn load(
-    lua: &Lua,
-    (chunk, name, _mode, env): (Value, Value, Value, Value),
-) -> mlua::Result<(Option<Function>, Option<String>)> {
-    let wrong = |expected: &str, value: &Value| {
-        Err(fail(lua, format!("load: expected {expected}, got {}", describe(value))))
-    };
-    let mut bytes = Vec::new();
-    let name = match name {
-        Value::Nil => "=(load)".to_owned(),
-        Value::String(name) => name.to_string_lossy(),
-        other => return wrong("a string as name", &other),
-    };
-    if !matches!(env, Value::Nil | Value::Table(_)) {
-        return wrong("a table as env", &env);
-    }
-    let mut append = |piece: &LuaString| match bytes.len() + piece.as_bytes().len() > MAX_CHUNK_BYTES {
-        true => {
-            let limit = MAX_CHUNK_BYTES >> 20;
-            Err(fail(lua, format!("load: the text is longer than {limit} MiB; load it in parts")))
-        }
-        false => {
-            bytes.extend_from_slice(&piece.as_bytes());
-            Ok(())
-        }
-    };
-    match chunk {
-        Value::String(text) => append(&text)?,
-        Value::Function(pieces) => {
-            while let Value::String(piece) = pieces.call::<Value>(())?
-                && !piece.as_bytes().is_empty()
-            {
-                append(&piece)?;
-            }
-        }
-        other => return wrong("a string or function", &other),
-    }
-    if bytes.first() == Some(&0x1b) {
-        let message = "load: compiled byte code is refused; only Lua source text is run";
-        return Ok((None, Some(message.to_owned())));
-    }
-    let mut chunk = lua.load(bytes).set_name(name).set_mode(ChunkMode::Text);
-    if let Value::Table(env) = env {
-        chunk = chunk.set_environment(env);
-    }
-    match chunk.into_function() {
-        Ok(function) => Ok((Some(function), None)),
-        Err(mlua::Error::SyntaxError { message, .. }) => Ok((None, Some(message))),
-        // Of the parser, at too deep nesting; with a traceback.
-        Err(mlua::Error::RuntimeError(text)) => Ok((None, text.lines().next().map(str::to_owned))),
-        Err(other) => Err(other),
-    }
-}
-
 fn require(lua: &Lua, loaded: &Table, name: &Value) -> mlua::Result<Value> {
     let Value::String(name) = name else {
-        return Err(fail(lua, format!("require: expected a module name, got a {}", name.type_name())));
+        bail!(lua, "require: expected a module name, got a {}", name.type_name());
     };
     let name = name.to_string_lossy();
     let library = app_data::<SharedLibrary>(lua)?;
@@ -395,7 +321,7 @@ fn require(lua: &Lua, loaded: &Table, name: &Value) -> mlua::Result<Value> {
     match loaded.get::<Value>(file)? {
         Value::Nil => {}
         Value::Boolean(false) => {
-            return Err(fail(lua, format!("require {name:?}: the modules require each other in a circle")));
+            bail!(lua, "require {name:?}: the modules require each other in a circle");
         }
         value => return Ok(value),
     }
@@ -428,7 +354,7 @@ fn refuse_unknown_fields(lua: &Lua, module: &str, value: &Value) -> mlua::Result
             .filter_map(|(key, _)| Some(key.as_string()?.to_string_lossy()))
             .collect();
         let message = unknown_name("field", &key, known.iter().map(String::as_str));
-        Err(fail(lua, format!("{module}: {message}")))
+        Err(fail!(lua, "{module}: {message}"))
     })?;
     let meta = lua.create_table()?;
     meta.set("__index", refuse)?;
@@ -439,7 +365,7 @@ fn refuse_unknown_fields(lua: &Lua, module: &str, value: &Value) -> mlua::Result
 fn iterable(lua: &Lua, (label, value): (String, Value)) -> mlua::Result<Value> {
     match list::plain(lua, &value)? {
         Value::Table(table) => Ok(Value::Table(table)),
-        other => Err(fail(lua, format!("{label}: expected a table, got {}", describe(&other)))),
+        other => Err(fail!(lua, "{label}: expected a table, got {}", describe(&other))),
     }
 }
 
@@ -494,7 +420,7 @@ impl MathRandom {
 /// `math.random()`, `math.random(m)`, `math.random(m, n)` as in Lua 5.4.
 fn draw(lua: &Lua, rng: &mut ChaCha8Rng, args: &MultiValue) -> mlua::Result<Value> {
     let bound = |value: &Value| {
-        lua.coerce_integer(value.clone())?.ok_or_else(|| fail(lua, "math.random: bounds are integers"))
+        lua.coerce_integer(value.clone())?.ok_or_else(|| fail!(lua, "math.random: bounds are integers"))
     };
     let (low, high) = match (args.front(), args.get(1)) {
         (None, _) => return Ok(Value::Number(seed::uniform(rng))),
@@ -505,7 +431,7 @@ fn draw(lua: &Lua, rng: &mut ChaCha8Rng, args: &MultiValue) -> mlua::Result<Valu
         return Ok(Value::Integer(rng.next_u64() as i64));
     }
     if low > high {
-        return Err(fail(lua, format!("math.random: the range {low}..{high} is empty")));
+        bail!(lua, "math.random: the range {low}..{high} is empty");
     }
     Ok(Value::Integer(seed::uniform_integer(rng, low, high)))
 }

@@ -4,7 +4,8 @@ local host = ...
 local raw_error, raw_tostring, raw_next, raw_format = error, tostring, next, string.format
 local raw_setmetatable, getmetatable, type, rawget, select = setmetatable, getmetatable, type, rawget, select
 local sort, pack, unpack, find, gsub, raw_pcall = table.sort, table.pack, table.unpack, string.find, string.gsub, pcall
-local raw_resume, raw_close = coroutine.resume, coroutine.close
+local raw_resume, raw_close, raw_load = coroutine.resume, coroutine.close, load
+local concat, byte = table.concat, string.byte
 
 -- An address differs from run to run, so it never becomes text.
 function tostring(...)
@@ -63,6 +64,36 @@ function xpcall(f, handler, ...)
   if results[1] then return unpack(results, 1, results.n) end
   local _, handled = pcall(handler, results[2])
   return false, handled
+end
+
+-- Text alone, since byte code can break the virtual machine; no hook stops the parser of a long one.
+function load(chunk, name, _, env)
+  local pieces, length = {}, 0
+  local function add(piece)
+    length = length + #piece
+    if length > 1 << 20 then raw_error("load: the text is longer than 1 MiB; load it in parts", 3) end
+    pieces[#pieces + 1] = piece
+  end
+  if type(chunk) == "function" then
+    for piece in chunk do
+      if type(piece) ~= "string" or piece == "" then break end
+      add(piece)
+    end
+  elseif type(chunk) == "string" then
+    add(chunk)
+  else
+    raw_error("load: expected a string or function, got " .. tostring(chunk), 2)
+  end
+  local text = concat(pieces)
+  if byte(text) == 27 then return nil, "load: compiled byte code is refused; only Lua source text is run" end
+  local made, message
+  if env == nil then
+    made, message = raw_load(text, name or "=(load)", "t")
+  else
+    made, message = raw_load(text, name or "=(load)", "t", env)
+  end
+  -- At too deep nesting a traceback follows.
+  return made, message and (gsub(message, "\n.*", ""))
 end
 
 -- A finaliser runs where no time limit holds.

@@ -12,7 +12,7 @@ use std::{
 use mlua::Lua;
 
 use super::{
-    error::{app_data, fail},
+    error::app_data,
     library::{FoundFile, SharedLibrary},
 };
 use softvt_common::parallel::lock;
@@ -29,7 +29,6 @@ enum Access {
 }
 
 impl PrivilegedAccess {
-    /// The access of a plan.
     pub(crate) fn granted() -> Self {
         Self(Arc::new(Mutex::new(Access::Granted)))
     }
@@ -40,10 +39,7 @@ impl PrivilegedAccess {
     }
 
     /// Grants or refuses further access, as the policy has declared.
-    ///
-    /// # Errors
-    /// The policy declares itself not privileged, and its script has used privileged functions: the error
-    /// of the first use.
+    /// Without privilege the error is that of the first use before.
     pub(crate) fn declare(&self, is_privileged: bool) -> mlua::Result<()> {
         let decided = if is_privileged { Access::Granted } else { Access::Refused };
         match std::mem::replace(&mut *lock(&self.0), decided) {
@@ -53,22 +49,16 @@ impl PrivilegedAccess {
     }
 }
 
-/// Checks that the script may use `what`.
-///
-/// # Errors
-/// At the script's line, for a policy that is not privileged.
 pub(crate) fn check_privilege(lua: &Lua, what: &str) -> mlua::Result<()> {
     let access = app_data::<PrivilegedAccess>(lua)?;
     let mut access = lock(&access.0);
     if matches!(*access, Access::Granted) {
         return Ok(());
     }
-    let error = fail(
+    let error = fail!(
         lua,
-        format!(
-            "{what}: a policy has no access to limits and materials of objects; use its observations, or declare \
+        "{what}: a policy has no access to limits and materials of objects; use its observations, or declare \
              privileged = true in softvt.policy{{…}}, which its results then state"
-        ),
     );
     match &mut *access {
         Access::Granted => Ok(()),
@@ -81,9 +71,6 @@ pub(crate) fn check_privilege(lua: &Lua, what: &str) -> mlua::Result<()> {
 }
 
 /// [`check_privilege`] of a module that a script requires, found in `file`.
-///
-/// # Errors
-/// As [`check_privilege`].
 pub(crate) fn check_module(lua: &Lua, name: &str, file: &FoundFile) -> mlua::Result<()> {
     // The comparison of contents reads other files, which plans need not wait for.
     let access = app_data::<PrivilegedAccess>(lua)?;

@@ -3,7 +3,10 @@
 //! Lua knows the line of a running call. The line of a single key, and the origin of a table whose call is over, are
 //! recovered here: by a note at every constructor call, and by a search in the source text.
 
-use std::sync::{Arc, Mutex};
+use std::{
+    fmt::Display,
+    sync::{Arc, Mutex},
+};
 
 use mlua::{Lua, Table};
 
@@ -32,7 +35,7 @@ pub(crate) fn origin_of_key(lua: &Lua, table: &Table, path: &[&str]) -> Option<S
 }
 
 /// An error at the line of `key` in the call that made `table`.
-pub(crate) fn fail_at_key(lua: &Lua, table: &Table, key: &str, message: impl Into<String>) -> mlua::Error {
+pub(crate) fn fail_at_key(lua: &Lua, table: &Table, key: &str, message: impl Display) -> mlua::Error {
     fail_at(lua, origin_of_key(lua, table, &[key]).or_else(|| current_line(lua)), message)
 }
 

@@ -30,10 +30,8 @@ const WATCHDOG_INTERVAL: Duration = Duration::from_millis(20);
 /// Called with a message when a library function does not return.
 pub type StuckHandler = Arc<dyn Fn(&str) + Send + Sync>;
 
-/// The clocks that the watchdog checks.
 static CLOCKS: Mutex<Vec<Weak<Mutex<ClockState>>>> = Mutex::new(Vec::new());
 
-/// Adds a clock to those that the watchdog checks.
 fn watch(clock: &Arc<Mutex<ClockState>>) {
     static THREAD: Once = Once::new();
     lock(&CLOCKS).push(Arc::downgrade(clock));
@@ -78,7 +76,6 @@ struct ClockState {
     call: Option<LimitedCall>,
 }
 
-/// A running call under a time limit.
 struct LimitedCall {
     limit: Duration,
     remaining: Remaining,
@@ -112,12 +109,10 @@ impl Moment {
     }
 }
 
-/// Processor time of this thread.
 fn thread_time() -> Duration {
     ThreadTime::now().as_duration()
 }
 
-/// The clock of one virtual machine.
 #[derive(Clone)]
 pub(crate) struct Clock(Arc<Mutex<ClockState>>);
 
@@ -130,7 +125,6 @@ impl Clock {
         clock
     }
 
-    /// Installs the hook in `lua`.
     pub(crate) fn install(&self, lua: &Lua) -> mlua::Result<()> {
         let clock = self.clone();
         lua.set_global_hook(HookTriggers::new().every_nth_instruction(HOOK_INTERVAL), move |lua, running| {
@@ -163,25 +157,25 @@ impl Clock {
 
     /// Limits the virtual machine to `limit` of this thread's processor time until the guard is dropped. A nested call
     /// keeps the outer limit.
-    pub(crate) fn start(&self, limit: Duration) -> Deadline {
+    pub(crate) fn start(&self, limit: Duration) -> ClockGuard {
         let mut state = lock(&self.0);
         if state.call.is_some() {
-            return Deadline(None);
+            return ClockGuard::None;
         }
         let remaining = Remaining::RunningUntil(thread_time() + limit);
         state.call = Some(LimitedCall { limit, remaining, last_seen: Some(Moment::now()) });
-        Deadline(Some(self.clone()))
+        ClockGuard::Deadline(self.clone())
     }
 
     /// Pauses the clock while a binding works in Rust (physics), until the guard is dropped.
-    pub(crate) fn pause(&self) -> Pause {
+    pub(crate) fn pause(&self) -> ClockGuard {
         if let Some(LimitedCall { remaining, .. }) = &mut lock(&self.0).call
             && let Remaining::RunningUntil(end) = *remaining
         {
             *remaining = Remaining::Paused(end.saturating_sub(thread_time()));
-            return Pause(Some(self.clone()));
+            return ClockGuard::Pause(self.clone());
         }
-        Pause(None)
+        ClockGuard::None
     }
 }
 
@@ -189,30 +183,28 @@ fn seconds(limit: Duration) -> String {
     format!("{} s", limit.as_secs_f64())
 }
 
-/// A running time limit; see [`Clock::start`].
+/// Ends a time limit or a pause on drop; see [`Clock::start`] and [`Clock::pause`].
 #[must_use]
-pub(crate) struct Deadline(Option<Clock>);
-
-impl Drop for Deadline {
-    fn drop(&mut self) {
-        if let Some(clock) = &self.0 {
-            lock(&clock.0).call = None;
-        }
-    }
+pub(crate) enum ClockGuard {
+    /// Of a nested call or pause, which changes nothing.
+    None,
+    Deadline(Clock),
+    Pause(Clock),
 }
 
-/// A paused clock; see [`Clock::pause`].
-#[must_use]
-pub(crate) struct Pause(Option<Clock>);
-
-impl Drop for Pause {
+impl Drop for ClockGuard {
     fn drop(&mut self) {
-        let Some(clock) = &self.0 else { return };
-        if let Some(call) = &mut lock(&clock.0).call
-            && let Remaining::Paused(left) = call.remaining
-        {
-            call.remaining = Remaining::RunningUntil(thread_time() + left);
-            call.last_seen = Some(Moment::now());
+        match self {
+            Self::None => {}
+            Self::Deadline(clock) => lock(&clock.0).call = None,
+            Self::Pause(clock) => {
+                if let Some(call) = &mut lock(&clock.0).call
+                    && let Remaining::Paused(left) = call.remaining
+                {
+                    call.remaining = Remaining::RunningUntil(thread_time() + left);
+                    call.last_seen = Some(Moment::now());
+                }
+            }
         }
     }
 }
@@ -223,7 +215,6 @@ mod tests {
 
     const LIMIT: Duration = Duration::from_millis(60);
 
-    /// Keeps this thread's processor busy for a time.
     fn busy(time: Duration) {
         let start = thread_time();
         while thread_time() - start < time {

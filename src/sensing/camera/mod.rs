@@ -74,11 +74,12 @@ pub use self::image::{RenderedImage, encode_png};
 pub use error::CameraError;
 pub use lens::check_cameras;
 pub use mesh::{
-    display::{DisplayMesh, NodeBinding},
+    display::DisplayMesh,
+    lod::NodeWeights,
     primitive::{box_mesh, flat_faces},
     render_mesh::RenderMesh,
 };
 pub(crate) use mesh::{lod::Lod, render_mesh::RenderSolid};
-pub use render::Renderer;
+pub use render::{Channels, Renderer};
 pub use scene::{FrameView, RenderObject, RenderScene, RestState, check_light};
 pub use softvt_signal::resize::resize;

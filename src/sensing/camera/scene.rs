@@ -57,7 +57,7 @@ pub struct RenderScene {
     pub(crate) lighting: Lighting,
     rest: RestState,
     /// Levels of detail in the world of each fixed object, and of others at rest, posed on first use.
-    still_meshes: StillMeshes,
+    still_meshes: PosedMeshes,
     /// Shadows of the fixed objects.
     pub(crate) fixed_shadow: Arc<ShadowMap>,
     /// Coarser shadows of fixed objects beyond the fine map, if there are any.
@@ -82,7 +82,7 @@ pub struct FrameView<'a> {
     pub links: &'a [Vec<Pose>],
     /// Pose of the robot's hand, world, for cameras mounted on it.
     pub hand_w: Option<Pose>,
-    /// Albedo at the nodes of each soft body, linear RGB, in place of its materials; those of its materials
+    /// Albedo at the nodes of each soft body, linear RGB, in place of its materials, which count
     /// where it is empty.
     pub node_colours: &'a [Vec<[f32; 3]>],
     /// Segmentation id of objects that are left out of the image, and of the shadows of what moves; 0 for none.
@@ -176,12 +176,12 @@ impl RenderScene {
                 reason: format!("{} objects; at most {MAX_OBJECTS} can be drawn, join some", objects.len()),
             });
         }
-        let still_meshes = StillMeshes::new(&objects);
+        let still_meshes = PosedMeshes::new(&objects);
         let is_fixed: Vec<bool> = objects.iter().map(RenderObject::is_fixed).collect();
-        let casters = still_meshes.casters(&objects, &is_fixed, &rest)?;
+        let casters = still_meshes.casters(&objects, &is_fixed, &rest.view())?;
         let fixed = (0..objects.len()).filter(|&index| is_fixed[index]);
         let bounds =
-            fixed.map(|index| still_meshes.get(&objects, index, objects[index].mesh.caster()?, &rest));
+            fixed.map(|index| still_meshes.get(&objects, index, objects[index].mesh.caster()?, &rest.view()));
         let bounds = bounds.collect::<Result<Vec<_>, _>>()?;
         let fixed_shadow = Arc::new(draw_shadow(ShadowMap::new(&lighting), &casters));
         let wide_shadow = wide_shadow_radius(&bounds, &lighting)
@@ -221,7 +221,7 @@ impl RenderScene {
             kept[index..].rotate_left(1);
             return Ok(kept[kept.len() - 1].map.clone());
         }
-        let casters = self.still_meshes.casters(&self.objects, is_still, &self.rest)?;
+        let casters = self.still_meshes.casters(&self.objects, is_still, &self.rest.view())?;
         let map = Arc::new(draw_shadow(ShadowMap::new(&self.lighting), &casters));
         if kept.len() == KEPT_SHADOWS {
             kept.remove(0);
@@ -237,7 +237,7 @@ impl RenderScene {
 
     /// A level of detail of an object that stands still, in the world.
     pub(crate) fn still_mesh(&self, object: usize, level: usize) -> Result<Arc<PosedMesh>, CameraError> {
-        self.still_meshes.get(&self.objects, object, level, &self.rest)
+        self.still_meshes.get(&self.objects, object, level, &self.rest.view())
     }
 }
 
@@ -246,14 +246,19 @@ fn draw_shadow(mut map: ShadowMap, casters: &[(Arc<PosedMesh>, &Lod)]) -> Shadow
     map
 }
 
-/// Levels of detail of objects that stand still in the world, by object and level, posed on first use.
+/// Levels of detail of objects in one state, by object and level, posed on first use.
 #[derive(Debug)]
-struct StillMeshes(Vec<Vec<OnceLock<Arc<PosedMesh>>>>);
+pub(crate) struct PosedMeshes(Vec<Vec<OnceLock<Arc<PosedMesh>>>>);
 
-impl StillMeshes {
-    fn new(objects: &[RenderObject]) -> Self {
+impl PosedMeshes {
+    pub(crate) fn new(objects: &[RenderObject]) -> Self {
         let levels = |object: &RenderObject| vec![OnceLock::new(); object.mesh.level_count()];
         Self(objects.iter().map(levels).collect())
+    }
+
+    /// Forgets the state.
+    pub(crate) fn clear(&mut self) {
+        self.0.iter_mut().flatten().for_each(|mesh| _ = mesh.take());
     }
 
     /// The objects that stand still and cast shadows, at the level of detail that does.
@@ -261,7 +266,7 @@ impl StillMeshes {
         &self,
         objects: &'a [RenderObject],
         is_still: &[bool],
-        rest: &RestState,
+        rest: &FrameView,
     ) -> Result<Vec<(Arc<PosedMesh>, &'a Lod)>, CameraError> {
         let casters = objects.iter().enumerate().filter(|(i, object)| is_still[*i] && object.casts_shadow);
         let posed = |(index, object): (usize, &'a RenderObject)| {
@@ -271,18 +276,19 @@ impl StillMeshes {
         casters.map(posed).collect()
     }
 
-    fn get(
+    /// A level of detail of an object; `state` is the same for all.
+    pub(crate) fn get(
         &self,
         objects: &[RenderObject],
         index: usize,
         level: usize,
-        rest: &RestState,
+        state: &FrameView,
     ) -> Result<Arc<PosedMesh>, CameraError> {
         let (slot, object) = (&self.0[index][level], &objects[index]);
         if let Some(posed) = slot.get() {
             return Ok(posed.clone());
         }
-        let posed = PosedMesh::new(object, object.mesh.level(level)?, &rest.view())?;
+        let posed = PosedMesh::new(object, object.mesh.level(level)?, state)?;
         Ok(slot.get_or_init(|| Arc::new(posed)).clone())
     }
 }
@@ -335,7 +341,7 @@ pub fn check_light(light: &Lighting) -> Result<(), CameraError> {
 pub(crate) struct PosedMesh {
     pub(crate) positions: Vec<V3>,
     pub(crate) normals: Vec<V3>,
-    /// Albedo in place of that of the materials; empty for the materials.
+    /// Albedo in place of the materials'; empty for the materials.
     pub(crate) albedo: Vec<V3>,
     /// Bounds of the vertices.
     pub(crate) bounds: Bounds,
@@ -343,7 +349,7 @@ pub(crate) struct PosedMesh {
 
 impl PosedMesh {
     /// Places a level of `object` as in the state `view`.
-    pub(crate) fn new(object: &RenderObject, lod: &Lod, view: &FrameView) -> Result<Self, CameraError> {
+    fn new(object: &RenderObject, lod: &Lod, view: &FrameView) -> Result<Self, CameraError> {
         let fail = |reason: String| CameraError::State { name: object.name.clone(), reason };
         let body_w = match object.body {
             BodyId::World => None,

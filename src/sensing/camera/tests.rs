@@ -30,11 +30,12 @@ fn object(id: u16, mesh: RenderMesh, body: BodyId, pose_in_body: Pose) -> Render
     }
 }
 
+fn mesh(shape: &Shape, visual: Visual) -> RenderMesh {
+    RenderMesh::from_shape("shape", shape, &[visual], &DiskCache::DISABLED).expect("a surface")
+}
+
 fn ball(id: u16, radius: f64, pose_w: Pose) -> RenderObject {
-    let mesh =
-        RenderMesh::from_shape("ball", &Shape::Sphere { radius }, &[Visual::default()], &DiskCache::DISABLED)
-            .expect("a ball");
-    object(id, mesh, BodyId::World, pose_w)
+    object(id, mesh(&Shape::Sphere { radius }, Visual::default()), BodyId::World, pose_w)
 }
 
 fn checker(size_m: f64) -> Visual {
@@ -51,9 +52,8 @@ fn checker(size_m: f64) -> Visual {
 /// A floor whose top is at z = 0.
 fn ground(visual: Visual) -> RenderObject {
     let half = Vec3::new(1.0, 1.0, 0.1);
-    let mesh = RenderMesh::from_shape("ground", &Shape::Box { half }, &[visual], &DiskCache::DISABLED)
-        .expect("a box");
-    let mut ground = object(1, mesh, BodyId::World, Pose::translation(0.0, 0.0, -0.1));
+    let mut ground =
+        object(1, mesh(&Shape::Box { half }, visual), BodyId::World, Pose::translation(0.0, 0.0, -0.1));
     ground.casts_shadow = false;
     ground
 }
@@ -86,9 +86,7 @@ fn a_straight_outline_is_straight_in_the_segmentation() {
     for shift in [0.0, 0.3, 0.5, 0.8] {
         let camera = above(1.0);
         let half = Vec3::new(0.1, 0.1, 0.01);
-        let mesh =
-            RenderMesh::from_shape("box", &Shape::Box { half }, &[Visual::default()], &DiskCache::DISABLED)
-                .expect("a box");
+        let mesh = mesh(&Shape::Box { half }, Visual::default());
         let x = shift / focal(&camera);
         let scene = scene(vec![
             ground(Visual::default()),
@@ -143,8 +141,9 @@ fn images_of_colours_or_of_segmentation_alone_are_those_of_whole_images() {
         // Renderers that have drawn another kind of image before, and fresh ones.
         let mut used = Renderer::default();
         for _ in 0..2 {
-            let rgb = used.render_rgb(&scene, &view, camera).expect("colours");
-            let segmentation = used.render_segmentation(&scene, &view, camera).expect("segmentation");
+            let rgb = used.render_channels(&scene, &view, camera, Channels::Colours).expect("colours");
+            let segmentation =
+                used.render_channels(&scene, &view, camera, Channels::Centres).expect("segmentation");
             let whole = used.render(&scene, &view, camera).expect("an image");
             let alone = Renderer::default().render(&scene, &view, camera).expect("an image");
             assert_eq!(whole, alone);
@@ -286,7 +285,7 @@ fn a_shadow_lies_opposite_the_light() {
     assert!(error < 5e-3, "the shadow is off by {error} m");
 }
 
-/// An object as rigid body 0, whose shadow is that of its coarsest level of detail.
+/// An object as rigid body 0, whose shadow its coarsest level of detail casts.
 fn lone(mesh: RenderMesh, casts_shadow: bool) -> Vec<RenderObject> {
     vec![RenderObject { casts_shadow, ..object(1, mesh, rigid(0), Pose::identity()) }]
 }
@@ -297,9 +296,7 @@ fn smooth_surfaces_do_not_shade_themselves_where_they_face_the_light() {
     let solid = |shape: Shape| {
         RenderMesh::from_solids("solid", &[RenderSolid::new(shape, 3e-3, 0)], &visuals).expect("a solid")
     };
-    let shape = |shape: &Shape| {
-        RenderMesh::from_shape("shape", shape, &visuals, &DiskCache::DISABLED).expect("a shape")
-    };
+    let shape = |shape: &Shape| mesh(shape, visuals[0].clone());
     let tube = Shape::Cylinder { radius: 0.06, half_height: 0.15 };
     let ball = Shape::Sphere { radius: 0.1 };
     let slab = Shape::Box { half: Vec3::new(0.2, 0.2, 0.02) };
@@ -373,10 +370,12 @@ fn fixed_objects_cast_shadows_outside_the_fine_shadow_map() {
     let mut lighting = Lighting { shadow_centre_w: Vec3::zeros(), ..Lighting::default() };
     (lighting.key.direction_w, lighting.key.softness_rad) = (Vec3::new(1.0, 0.0, 1.0), 0.01);
     let slab = |half: Vec3, at: Vec3| {
-        let mesh =
-            RenderMesh::from_shape("slab", &Shape::Box { half }, &[Visual::default()], &DiskCache::DISABLED)
-                .expect("a box");
-        object(1, mesh, BodyId::World, Pose::from_parts(at.into(), Quat::identity()))
+        object(
+            1,
+            mesh(&Shape::Box { half }, Visual::default()),
+            BodyId::World,
+            Pose::from_parts(at.into(), Quat::identity()),
+        )
     };
     let floor = slab(Vec3::new(6.0, 3.0, 0.05), Vec3::new(0.0, 0.0, -0.05));
     let wall = slab(Vec3::new(0.02, 1.5, 0.5), Vec3::new(3.02, 0.0, 0.5));
@@ -413,17 +412,12 @@ fn invalid_cameras_are_rejected_with_the_name_of_the_field() {
     let scene = scene(vec![ball(1, 0.1, Pose::identity())]);
     let good = above(1.0);
     let nowhere = Pose::translation(f64::NAN, 0.0, 0.0);
+    let fovy = "fovy: expected 0.01 to 2.8 rad (0.6° to 160°), got ";
     for (camera, words) in [
         (Camera { width: 0, ..good.clone() }, "width: expected 1 to 4096 pixels, got 0"),
         (Camera { height: 100_000, ..good.clone() }, "height: expected 1 to 4096 pixels, got 100000"),
-        (
-            Camera { fovy_rad: 3.2, ..good.clone() },
-            "fovy: expected 0.01 to 2.8 rad (0.6° to 160°), got 3.2 rad",
-        ),
-        (
-            Camera { fovy_rad: f64::NAN, ..good.clone() },
-            "fovy: expected 0.01 to 2.8 rad (0.6° to 160°), got NaN rad",
-        ),
+        (Camera { fovy_rad: 3.2, ..good.clone() }, fovy),
+        (Camera { fovy_rad: f64::NAN, ..good.clone() }, fovy),
         (Camera { near_m: 0.0, ..good.clone() }, "near: expected at least 0.0001 m, got 0 m"),
         (Camera { far_m: 0.01, ..good.clone() }, "far: expected more than near (0.05 m), got 0.01 m"),
         (Camera { pose: nowhere, ..good.clone() }, "position: expected metres within ±1e6"),
@@ -459,9 +453,6 @@ fn cameras_are_validated_one_by_one_and_together() {
     let many: Vec<Camera> = (0..65).map(|i| named(&i.to_string(), 1)).collect();
     let (_, error) = check_cameras(&many).expect_err("too many");
     assert!(error.to_string().contains("at most 64 cameras"), "{error}");
-    let turned = Camera { near_m: 2.0, far_m: 1.0, ..above(1.0) };
-    let (_, error) = check_cameras(&[turned]).expect_err("nothing between");
-    assert_eq!(error.to_string(), "camera third_person: far: expected more than near (2 m), got 1 m");
 }
 
 #[test]

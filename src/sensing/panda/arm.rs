@@ -122,7 +122,7 @@ fn forearm() -> RobotPart {
     RobotPart::new(Some(4), "forearm", vec![RenderSolid::new(shell, FINE, WHITE_SHELL), rim, cap])
 }
 
-/// Link 6: the wrist, from the housing on its axis to that of the last joint at x = 88 mm.
+/// Link 6: the wrist, from the housing on its axis to the housing of the last joint at x = 88 mm.
 fn wrist() -> RobotPart {
     let core = rounded_cylinder([0.0, 0.0, -0.0575], [0.0, 0.0, 0.048], 0.050, 10e-3);
     let bridge = capsule([0.02, 0.0, 0.002], [0.088, 0.0, 0.0], 0.040);

@@ -60,23 +60,16 @@ fn visuals() -> Vec<Visual> {
 /// The meshes of the robot. They take a few tenths of a second to build and can be shared by all episodes.
 #[derive(Clone, Debug)]
 pub struct RobotMeshes {
-    parts: Vec<PartMesh>,
+    parts: Vec<PartMesh<Arc<RenderMesh>>>,
 }
 
-#[derive(Clone, Debug)]
-struct PartMesh {
+/// The mesh of a part: in storage its levels of detail, since its surface has no textures.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+struct PartMesh<M> {
     /// Index of the link in the articulation; `None` for the base.
     link: Option<usize>,
     name: String,
-    mesh: Arc<RenderMesh>,
-}
-
-/// A part as it is stored: its surface has no textures.
-#[derive(Serialize, Deserialize)]
-struct PartLevels {
-    link: Option<usize>,
-    name: String,
-    levels: Vec<Lod>,
+    mesh: M,
 }
 
 impl RobotMeshes {
@@ -86,42 +79,35 @@ impl RobotMeshes {
     /// A part has no surface. This is a bug in this module.
     pub fn new(cache: &DiskCache) -> Result<Self, CameraError> {
         // They follow from the code alone.
-        let levels = cache.get("robot", &(), || Self::build()?.levels())?;
-        let part = |part: PartLevels| PartMesh {
-            link: part.link,
-            name: part.name,
-            mesh: Arc::new(RenderMesh::from_levels(part.levels)),
+        let parts = cache.get("robot", &(), Self::build)?;
+        let part = |PartMesh { link, name, mesh }: PartMesh<Vec<Lod>>| PartMesh {
+            link,
+            name,
+            mesh: Arc::new(RenderMesh::from_levels(mesh)),
         };
-        Ok(Self { parts: levels.into_iter().map(part).collect() })
+        Ok(Self { parts: parts.into_iter().map(part).collect() })
     }
 
-    /// The levels of detail of all parts.
-    fn levels(self) -> Result<Vec<PartLevels>, CameraError> {
-        let levels = |PartMesh { link, name, mesh }| {
-            let levels = (0..mesh.level_count()).map(|index| mesh.level(index).cloned());
-            Ok(PartLevels { link, name, levels: levels.collect::<Result<_, _>>()? })
-        };
-        self.parts.into_iter().map(levels).collect()
-    }
-
-    fn build() -> Result<Self, CameraError> {
+    fn build() -> Result<Vec<PartMesh<Vec<Lod>>>, CameraError> {
         let visuals = visuals();
+        let part = |link, name: &str, mesh: RenderMesh| {
+            let levels = (0..mesh.level_count()).map(|index| mesh.level(index).cloned());
+            Ok(PartMesh { link, name: name.to_owned(), mesh: levels.collect::<Result<_, CameraError>>()? })
+        };
         let mut parts = vec![arm::base()];
         parts.extend(arm::links());
         parts.push(hand::hand());
         parts.extend(Side::BOTH.map(hand::finger));
         let mut meshes = Vec::new();
         for RobotPart { link, name, solids } in parts {
-            let mesh = RenderMesh::from_solids(name, &solids, &visuals)?;
-            meshes.push(PartMesh { link, name: name.to_owned(), mesh: Arc::new(mesh) });
+            meshes.push(part(link, name, RenderMesh::from_solids(name, &solids, &visuals)?)?);
         }
         for (side, name) in Side::BOTH.into_iter().zip(["left gel", "right gel"]) {
             let (link, visual) = (Some(panda::finger_link(side)), &visuals[SENSOR_GEL..]);
             let mesh = RenderMesh::from_mesh(name, &hand::gel(side), visual, &DiskCache::DISABLED)?;
-            let mesh = mesh.with_coarser_levels()?;
-            meshes.push(PartMesh { link, name: name.to_owned(), mesh: Arc::new(mesh) });
+            meshes.push(part(link, name, mesh.with_coarser_levels()?)?);
         }
-        Ok(Self { parts: meshes })
+        Ok(meshes)
     }
 
     /// The objects to draw for the articulation `articulation`, whose base is at `base_w` (world). All
@@ -132,7 +118,7 @@ impl RobotMeshes {
         base_w: Pose,
         segmentation_id: u16,
     ) -> Vec<RenderObject> {
-        let object = |part: &PartMesh| RenderObject {
+        let object = |part: &PartMesh<Arc<RenderMesh>>| RenderObject {
             name: format!("panda {}", part.name),
             segmentation_id,
             mesh: part.mesh.clone(),

@@ -155,7 +155,7 @@ impl RoundedPlate {
         Mesh { vertices, triangles, uvs: Vec::new() }
     }
 
-    /// The polygon offset by `outset`: an arc at each corner, from the normal of one side to that of the next.
+    /// The polygon offset by `outset`: an arc at each corner, from the normal of one side to the normal of the next.
     fn outline(&self, outset: f64) -> Vec<[f64; 2]> {
         let n = self.corners.len();
         let mut outline = Vec::new();

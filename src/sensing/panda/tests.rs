@@ -3,12 +3,10 @@
 use std::sync::OnceLock;
 
 use super::*;
-use crate::camera::{FrameView, RenderScene, Renderer};
 use softvt_common::disk_cache::DiskCache;
 use softvt_geometry::Vec3;
 use softvt_physics::joints::forward;
 use softvt_robot::{GripperSpec, pads, panda};
-use softvt_scene::{Camera, Lighting};
 
 fn meshes() -> &'static RobotMeshes {
     static MESHES: OnceLock<RobotMeshes> = OnceLock::new();
@@ -17,13 +15,6 @@ fn meshes() -> &'static RobotMeshes {
 
 /// Joint positions, none of them zero: joints 1 to 7, then the fingers half open.
 const POSE: [f64; panda::DOFS] = [0.3, -0.5, 0.2, -2.0, 0.4, 1.9, 0.7, 0.02, 0.02];
-
-#[test]
-fn the_robot_has_a_moderate_number_of_triangles() {
-    let triangles: usize =
-        meshes().parts.iter().map(|part| part.mesh.level(0).expect("a level").triangles.len()).sum();
-    assert!((5_000..=30_000).contains(&triangles), "{triangles}");
-}
 
 #[test]
 fn every_link_is_drawn_once() {
@@ -98,21 +89,4 @@ fn drawn_gels_match_the_contact_surfaces() {
         });
         assert_eq!(in_front.count(), 0, "nothing is in front of the apex");
     }
-}
-
-#[test]
-fn the_arm_is_light_and_the_sensors_are_dark() {
-    let objects = meshes().objects(ArticulationId::new(0), Pose::translation(-0.66, 0.0, 0.0), 200);
-    let stage = RenderScene::new(objects, Lighting::default()).expect("good light");
-    let tree = panda::tree(Pose::translation(-0.66, 0.0, 0.0), &GripperSpec::default());
-    let links = [forward(&tree, &[0.0, -0.19, 0.0, -2.4, 0.0, 2.245, 0.79, 0.04, 0.04])];
-    let view = FrameView { links: &links, ..FrameView::default() };
-    let image = Renderer::default().render(&stage, &view, &Camera::third_person_table()).expect("a image");
-    let mut tones: Vec<u32> = (0..224 * 224)
-        .filter(|&i| image.segmentation[i] == 200)
-        .map(|i| image.rgb[3 * i..3 * i + 3].iter().map(|&c| u32::from(c)).sum::<u32>() / 3)
-        .collect();
-    tones.sort_unstable();
-    assert!(tones.len() > 2000, "{} pixels", tones.len());
-    assert!(tones[tones.len() / 2] > 140 && tones[tones.len() / 20] < 60, "{:?}", tones[tones.len() / 2]);
 }

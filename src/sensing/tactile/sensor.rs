@@ -9,7 +9,7 @@ use super::{
     image::{OpticsError, PolynomialOptics, TaximOptics},
     markers::{MarkerStyle, Markers},
 };
-use softvt_common::{npy::NpzError, range::RangeError};
+use softvt_common::{npy::NpyError, range::RangeError};
 use softvt_robot::PadSurface;
 use softvt_robot::tactile::{MarkerModel, OpticsModel, TactileSpec};
 
@@ -22,7 +22,7 @@ pub enum TactileSensorError {
     #[error(transparent)]
     Optics(#[from] OpticsError),
     #[error("tactile.optics.tables: {0}")]
-    Tables(#[from] NpzError),
+    Tables(#[from] NpyError),
 }
 
 /// Renderer of the colour image.

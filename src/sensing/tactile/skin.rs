@@ -47,7 +47,7 @@ impl PlacedSkin<'_> {
 }
 
 /// Motion of a skin with the nodes of a soft body: quadratic B-splines over the voxel grid (de Boor, *A Practical
-/// Guide to Splines*, 1978), whose slope runs linearly from the mean slope of one voxel to that of the next.
+/// Guide to Splines*, 1978), whose slope runs linearly from the mean slope of one voxel to the mean slope of the next.
 ///
 /// Trilinear weights would break the slope at every face, and a tactile image shows nothing but slopes. Linear
 /// motions are exact; waves of four voxels keep three quarters of their height.
@@ -311,7 +311,7 @@ mod tests {
             let expected = (pose * nalgebra::Point3::from(f * rest)).coords;
             assert!((moved - expected).norm() < 1e-15, "{moved} and {expected}");
         }
-        // At rest, the vertices are those of the surface, in another order.
+        // At rest, the vertices are the surface's, in another order.
         let sorted = |vertices: &[Vec3]| {
             let mut rounded: Vec<_> =
                 vertices.iter().map(|v| [v.x, v.y, v.z].map(|x| (1e9 * x).round())).collect();
@@ -334,7 +334,7 @@ mod tests {
         let rest = skin.place_soft(&mesh.nodes, &Pose::identity());
         let bent = skin.place_soft(&nodes, &Pose::identity());
         assert_eq!(rest.triangles, bent.triangles);
-        // Slopes along short edges of the skin against those of the bent ball.
+        // Slopes along short edges of the skin against the bent ball's.
         let step = |a: u32, b: u32| {
             let [p, q] = [a, b].map(|v| rest.vertices[v as usize]);
             let [x, y] = [a, b].map(|v| bent.vertices[v as usize]);

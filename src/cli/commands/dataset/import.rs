@@ -34,9 +34,6 @@ pub(crate) struct ImportArgs {
 }
 
 /// Imports the demonstrations that the arguments name.
-///
-/// # Errors
-/// As [`import::import`].
 pub(super) fn run(args: ImportArgs) -> Result<(), CliError> {
     let recording = &args.recording.options(None);
     let run = args.recording.config(args.script, args.tasks)?.load()?;

@@ -19,15 +19,14 @@ use crate::{
 use softvt_common::cancel;
 use softvt_common::{files, text::counted};
 use softvt_dataset::{
-    DatasetError,
-    check::{self, CheckScope},
+    DatasetError, check,
     export::{self, ArmControl, ExportConfig, ExportFormat},
     stats,
 };
 use softvt_policy::profile::GripCode;
 use softvt_runner::{
     Observer,
-    replay::{DemoRef, check_complete, demos_of, simulate_demos},
+    replay::{DemoRef, demos_of, simulate_demos},
     stored_folder::enter_for_dataset,
     thread_count,
 };
@@ -113,15 +112,14 @@ fn parse_replays(word: &str) -> Result<usize, String> {
 /// Any problem of the dataset, or (exit code 1) a demonstration that is not reproduced.
 fn run_check(args: &DatasetCheckArgs) -> Result<(), CliError> {
     let path = &args.path;
-    check_complete(path)?;
-    let report = if path.is_dir() { check::folder(path, CheckScope::Whole) } else { check::file(path) }?;
+    let report = if path.is_dir() { check::folder(path) } else { check::file(path) }?;
     if !report.problems.is_empty() {
-        return Err(CliError::input(format!(
+        bail!(
             "{}\n{}: {}",
             report.problems.join("\n"),
             path.display(),
             counted(report.problems.len(), "problem")
-        )));
+        );
     }
     let observer: Arc<dyn Observer> = Arc::new(Console::default());
     let demos = match args.replays {
@@ -130,13 +128,13 @@ fn run_check(args: &DatasetCheckArgs) -> Result<(), CliError> {
     };
     let replays = simulate_demos(&demos, &observer)?;
     let is_ok = replays.iter().all(|replay| replay.difference.is_none());
-    print(&format!(
+    out!(
         "{}, {}, {}{}\n",
         counted(report.demos, "demonstration"),
         counted(report.steps, "step"),
         counted(report.videos, "video"),
         if is_ok { ": OK" } else { "" }
-    ))?;
+    )?;
     report_replays(&demos, &replays)
 }
 
@@ -146,12 +144,7 @@ fn sample(demos: &[DemoRef], count: usize) -> Vec<DemoRef> {
     (0..count).map(|i| demos[i * demos.len() / count].clone()).collect()
 }
 
-/// Exports a recording.
-///
-/// # Errors
-/// As [`export::export`]. No output remains then.
 fn run_export(args: ExportArgs) -> Result<(), CliError> {
-    check_complete(&args.path)?;
     let config = ExportConfig {
         data: args.path,
         out: args.out,
@@ -170,48 +163,45 @@ fn run_export(args: ExportArgs) -> Result<(), CliError> {
         DatasetError::Interrupted => CliError::interrupted("interrupted; nothing was written"),
         other => CliError::input(other),
     })?;
-    warn_of_problems(&config.data)?;
-    print(&format!(
+    notice_missing_digests(&config.data, &files_of(&config.data)?)?;
+    out!(
         "{}, {}, {}: {}\n",
         counted(exported.episodes, "episode"),
         counted(exported.frames, "frame"),
         counted(exported.tasks, "prompt"),
         config.out.display()
-    ))
+    )
 }
 
-/// Tells the first problem of the numbers of a recording. Recordings of earlier versions lack streams that exports and
-/// distributions do not need.
-fn warn_of_problems(data: &Path) -> Result<(), CliError> {
-    let problems = check::folder(data, CheckScope::Numbers)?.problems;
-    if let Some(first) = problems.first() {
-        let count = counted(problems.len(), "problem");
-        let all = format!("softvt dataset check {}", data.display());
-        eprint_notice(format!("{first}: the recording has {count}; {all} lists them and checks its images"));
+/// The HDF5 files of a dataset.
+fn files_of(path: &Path) -> Result<Vec<PathBuf>, CliError> {
+    let mut paths: Vec<PathBuf> = demos_of(path)?.into_iter().map(|demo| demo.file).collect();
+    paths.dedup();
+    Ok(paths)
+}
+
+fn notice_missing_digests(data: &Path, files: &[PathBuf]) -> Result<(), CliError> {
+    if let Some(first) = check::without_digest(files)? {
+        eprint_notice(format_args!("{first}; softvt dataset check {} lists them", data.display()));
     }
     Ok(())
 }
 
 /// Prints and plots the distributions.
-///
-/// # Errors
-/// The dataset cannot be read, or the plot cannot be written.
 fn run_stats(args: &DatasetStatsArgs) -> Result<(), CliError> {
     let path = &args.path;
     let default = if path.is_dir() { path.join("stats.svg") } else { path.with_extension("stats.svg") };
     let out = args.out.clone().unwrap_or(default);
     check_output_file("--out", &out, OutputFormat::SVG)?;
-    check_complete(path)?;
-    let mut paths: Vec<PathBuf> = demos_of(path)?.into_iter().map(|demo| demo.file).collect();
-    paths.dedup();
+    let paths = files_of(path)?;
     let distributions = stats::column_statistics(&paths)?;
     match args.json {
         true => print_json(&distributions),
-        false => print(&stats::table(&distributions)),
+        false => print(stats::table(&distributions)),
     }?;
     files::replace(&out, stats::svg(&distributions).as_bytes())?;
     eprint_notice(out.display());
-    if path.is_dir() { warn_of_problems(path) } else { Ok(()) }
+    notice_missing_digests(path, &paths)
 }
 
 #[cfg(test)]

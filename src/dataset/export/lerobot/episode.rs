@@ -30,21 +30,15 @@ pub(super) trait LerobotEpisodeWriter: Send {
     fn finish(self: Box<Self>) -> Result<(), DatasetError>;
 }
 
-/// An episode ready to be written.
 pub(super) struct EpisodeData<'a> {
     pub index: usize,
     pub demo: &'a SelectedDemo,
     /// Columns of its table, in the order of the features.
     pub columns: Vec<ColumnValues>,
-    /// Statistics of the columns.
     pub statistics: Vec<FeatureStatistics>,
 }
 
 impl<'a> EpisodeData<'a> {
-    /// Reads episode `index`.
-    ///
-    /// # Errors
-    /// A stream is missing, of unexpected shape or not finite; or the export was cancelled.
     pub(super) fn read(
         job: &ExportJob<'_>,
         features: &[Feature],
@@ -86,7 +80,10 @@ impl<'a> EpisodeData<'a> {
                     episode.push(key, shape, parts, ColumnValues::F32(numbers));
                 }
                 Content::Vector | Content::Action => {
-                    episode.push_vectors(key, feature.shape[0], numbers);
+                    let length = feature.shape[0];
+                    let column = |i: usize| numbers.iter().skip(i).step_by(length).map(|x| f64::from(*x));
+                    let parts = (0..length).map(|i| ValueStatistics::of(column(i).collect())).collect();
+                    episode.push(key, &[length], parts, ColumnValues::F32(numbers));
                 }
             }
         }
@@ -98,13 +95,6 @@ impl<'a> EpisodeData<'a> {
             episode.push(name, &[1], parts, ColumnValues::I64(numbers));
         }
         Ok(episode)
-    }
-
-    /// Adds a column of vectors, row by row.
-    fn push_vectors(&mut self, name: &'static str, length: usize, rows: Vec<f32>) {
-        let column = |i: usize| rows.iter().skip(i).step_by(length).map(|x| f64::from(*x));
-        let parts = (0..length).map(|i| ValueStatistics::of(column(i).collect())).collect();
-        self.push(name, &[length], parts, ColumnValues::F32(rows));
     }
 
     fn push(
@@ -120,10 +110,8 @@ impl<'a> EpisodeData<'a> {
     }
 }
 
-/// Images of a feature.
 struct ImageColumn {
     images: Vec<EmbeddedImage>,
-    /// Counts of the values of each channel.
     counts: [ValueCounts; 3],
 }
 

@@ -12,14 +12,12 @@ use crate::export::features::{Content, Feature};
 /// Index features of a row, in order: the last ones.
 pub(super) const INDEX_FEATURES: [&str; 4] = ["frame_index", "episode_index", "index", "task_index"];
 
-/// A column of the rows.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Column {
     /// Its key in this version.
     pub name: &'static str,
     /// Type in LeRobot's terms.
     dtype: &'static str,
-    /// Shape per row.
     shape: Vec<usize>,
     /// Names of its numbers or axes.
     names: Value,

@@ -30,7 +30,11 @@ pub(super) fn write(
 ) -> Result<(), DatasetError> {
     let ExportJob { dir, selection, .. } = job;
     match version {
-        LeRobotVersion::V21 => write_task_lines(dir, &selection.prompts)?,
+        LeRobotVersion::V21 => {
+            let line = |(i, prompt): (usize, &String)| json!({ "task_index": i, "task": prompt });
+            let lines = selection.prompts.iter().enumerate().map(line);
+            files::write_json_lines(&dir.join("meta/tasks.jsonl"), lines)?;
+        }
         LeRobotVersion::V30 => write_task_table(dir, &selection.prompts)?,
     }
     write_origins(dir, selection)?;
@@ -66,11 +70,6 @@ fn info(version: LeRobotVersion, features: &[Column], summary: ExportSummary) ->
     info["video_path"] = Value::Null;
     info["features"] = features::info(features);
     info
-}
-
-fn write_task_lines(dir: &Path, prompts: &[String]) -> Result<(), DatasetError> {
-    let lines = prompts.iter().enumerate().map(|(i, prompt)| json!({ "task_index": i, "task": prompt }));
-    Ok(files::write_json_lines(&dir.join("meta/tasks.jsonl"), lines)?)
 }
 
 /// The table that pandas writes for a data frame indexed by the prompts; its metadata declare the index.
@@ -116,7 +115,6 @@ fn write_origins(dir: &Path, selection: &Selection) -> Result<(), DatasetError> 
     Ok(files::write_json_lines(&dir.join("meta/softvt.jsonl"), lines)?)
 }
 
-/// The human-readable description.
 fn readme(job: &ExportJob<'_>, version: LeRobotVersion) -> String {
     let encoding = format!(
         "`meta/softvt.json` states the control ({}) and the grip code ({}), and `meta/softvt.jsonl` the demonstration of each episode.",

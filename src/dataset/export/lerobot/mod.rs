@@ -19,10 +19,6 @@ use crate::DatasetError;
 
 pub use version::LeRobotVersion;
 
-/// Writes all files of a dataset.
-///
-/// # Errors
-/// As [`export`](super::export).
 pub(super) fn write(
     job: &ExportJob<'_>,
     version: LeRobotVersion,

@@ -15,7 +15,6 @@ pub(super) struct ValueMoments {
     min: f64,
     max: f64,
     mean: f64,
-    /// Sum of squared deviations from the mean.
     squared_deviations: f64,
 }
 
@@ -60,11 +59,6 @@ impl ValueMoments {
         self.count = count;
     }
 
-    fn standard_deviation(&self) -> f64 {
-        (self.squared_deviations / self.count.max(1.0)).sqrt()
-    }
-
-    /// Moments of the union of several sets.
     pub(super) fn merged<'a>(all: impl Iterator<Item = &'a Self>) -> Self {
         let mut sum = Self::EMPTY;
         all.for_each(|one| sum.merge(one));
@@ -89,7 +83,6 @@ impl ValueCounts {
         self.counts[bin] += 1;
     }
 
-    /// Counts the nearest number.
     pub(super) fn count_nearest(&mut self, x: f64) {
         // The cast saturates at 0.
         let bin = (x / self.step).round() as usize;
@@ -113,10 +106,8 @@ impl ValueCounts {
     }
 }
 
-/// Numbers from which quantiles are computed.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum QuantileSource {
-    /// No quantiles are requested.
     None,
     All(Vec<f64>),
     Counts(ValueCounts),
@@ -142,7 +133,6 @@ impl ValueStatistics {
         Self { moments, quantile_source: QuantileSource::Counts(counts) }
     }
 
-    /// Combines two sets of the same kind.
     pub(super) fn merge(&mut self, other: &Self) {
         self.moments.merge(&other.moments);
         match (&mut self.quantile_source, &other.quantile_source) {
@@ -172,13 +162,11 @@ impl ValueStatistics {
     }
 }
 
-/// Statistics of a feature.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct FeatureStatistics {
     pub name: &'static str,
     /// Shape of each figure.
     pub shape: Vec<usize>,
-    /// Number of steps.
     pub steps: u64,
     /// Statistics of each number, in the order of `shape`.
     pub parts: Vec<ValueStatistics>,
@@ -192,7 +180,6 @@ pub(super) struct Figure {
 }
 
 impl FeatureStatistics {
-    /// Adds the steps of another episode.
     pub(super) fn merge(&mut self, other: &Self) {
         self.steps += other.steps;
         self.parts.iter_mut().zip(&other.parts).for_each(|(part, more)| part.merge(more));
@@ -208,7 +195,7 @@ impl FeatureStatistics {
             figure("min", |m| m.min),
             figure("max", |m| m.max),
             figure("mean", |m| m.mean),
-            figure("std", ValueMoments::standard_deviation),
+            figure("std", |m| (m.squared_deviations / m.count.max(1.0)).sqrt()),
         ];
         let quantiles = self.parts.iter().map(ValueStatistics::quantiles).collect::<Option<Vec<[f64; 5]>>>();
         if let Some(quantiles) = quantiles.filter(|_| with_quantiles) {

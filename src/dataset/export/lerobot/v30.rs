@@ -31,7 +31,6 @@ struct EpisodeSummary {
     first_frame: usize,
     /// Number of the file that holds its rows.
     file: usize,
-    /// Figures of every feature.
     figures: Vec<Vec<Figure>>,
 }
 
@@ -43,7 +42,6 @@ pub(super) struct SharedTableWriter {
     table: Option<ParquetTable>,
     file: usize,
     episodes: Vec<EpisodeSummary>,
-    /// Statistics of all episodes.
     total: Vec<FeatureStatistics>,
 }
 

@@ -2,7 +2,6 @@
 
 use crate::export::features::Feature;
 
-/// Version of LeRobot's dataset layout.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum LeRobotVersion {
     /// One table per episode; used by openpi and SoftVTBench.
@@ -11,7 +10,6 @@ pub enum LeRobotVersion {
     V30,
 }
 
-/// Files per folder.
 pub(super) const CHUNK: usize = 1000;
 /// Largest table of version 3.0, MB of 2²⁰ bytes, unless a single episode is larger.
 pub(super) const MAX_TABLE_MB: usize = 100;

@@ -19,9 +19,6 @@ const MAX_RECORD: usize = i32::MAX as usize;
 
 /// Reads a demonstration and encodes it as a `tf.train.Example`: the values of all steps under the path of each feature
 /// in `features.json`.
-///
-/// # Errors
-/// A stream is missing, of unexpected shape or not finite; the record is too large; or the export was cancelled.
 pub(super) fn read(job: &ExportJob<'_>, demo: &SelectedDemo) -> Result<Vec<u8>, DatasetError> {
     let reader = DemoReader::open(demo)?;
     let (images, vectors): (Vec<_>, Vec<_>) =
@@ -74,7 +71,7 @@ pub(super) fn read(job: &ExportJob<'_>, demo: &SelectedDemo) -> Result<Vec<u8>, 
     let bytes = example.encoded_len();
     if bytes > MAX_RECORD {
         let what = format!("its record has {bytes} bytes, and TensorFlow reads at most {MAX_RECORD}");
-        return Err(DatasetError::content(&demo.path, format!("/data/demo_{}", entry.demo_id), what));
+        return Err(DatasetError::content(&demo.path, format_args!("/data/demo_{}", entry.demo_id), what));
     }
     Ok(example.encode_to_vec())
 }

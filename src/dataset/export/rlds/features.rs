@@ -8,7 +8,6 @@ use crate::export::{
     features::{self, Content, Feature},
 };
 
-/// Features of an episode.
 pub(super) fn json(job: &ExportJob<'_>) -> Value {
     let steps = json!({
         "pythonClassName": class("dataset_feature.Dataset"),

@@ -26,9 +26,6 @@ const VERSION: &str = "1.0.0";
 const MAX_SHARD_MB: usize = 200;
 
 /// Writes all files of a dataset. `dataset_info.json` is last: TensorFlow Datasets opens nothing without it.
-///
-/// # Errors
-/// As [`export`](super::export).
 pub(super) fn write(
     job: &ExportJob<'_>,
     on_episode: &mut dyn FnMut(usize, &str),
@@ -78,7 +75,6 @@ fn info(name: &str, split: &Split) -> Value {
     })
 }
 
-/// The human-readable description.
 fn readme(job: &ExportJob<'_>, name: &str) -> String {
     let files = format!(
         "`tfds.builder_from_directory(\"{name}/{VERSION}\")` of TensorFlow Datasets opens it. `softvt.json` beside the \

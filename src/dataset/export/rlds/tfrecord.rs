@@ -31,16 +31,13 @@ fn write_record(file: &mut impl Write, record: &[u8]) -> io::Result<()> {
     file.write_all(&masked_checksum(record).to_le_bytes())
 }
 
-/// Contents of finished files.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub(super) struct Split {
-    /// Records of each file.
     pub shard_lengths: Vec<usize>,
     /// Bytes of all records, without lengths and checksums.
     pub bytes: usize,
 }
 
-/// Writes files of limited size.
 pub(super) struct ShardWriter {
     dir: PathBuf,
     /// Beginning of the names of the files.
@@ -51,7 +48,6 @@ pub(super) struct ShardWriter {
     split: Split,
 }
 
-/// A file that is being written.
 struct Shard {
     file: BufWriter<File>,
     path: PathBuf,
@@ -87,7 +83,6 @@ impl ShardWriter {
         self.dir.join(format!("{}-{index:05}", self.name))
     }
 
-    /// Appends a record.
     pub(super) fn add(&mut self, record: &[u8]) -> Result<(), FileError> {
         let is_full = |shard: &Shard| shard.bytes + record.len() + FRAME > self.max_bytes;
         if self.shard.as_ref().is_some_and(is_full) {

@@ -111,6 +111,7 @@ local function run()
     body = softvt.soft { youngs_pa = 1e4, poisson = 0.3, density = 300, resolution = 2 },
     position = { 0, 0, 0 },
   }
+  all("softvt.Attachment", world:attach { body = body, region = box, to = solid })
   all("softvt.Solid", solid)
   all("softvt.Body", body)
   all("softvt.World", world)

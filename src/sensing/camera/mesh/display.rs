@@ -1,16 +1,10 @@
 //! The triangles of an object with a colour at each vertex, for viewers that draw by themselves.
 
-use super::{lod::Lod, render_mesh::RenderMesh};
+use super::{
+    lod::{Lod, NodeWeights},
+    render_mesh::RenderMesh,
+};
 use crate::camera::{error::CameraError, math::f32x8};
-
-/// A vertex of a soft body as a weighted sum of nodes.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct NodeBinding {
-    /// Indices of the nodes.
-    pub nodes: [u32; 8],
-    /// Their weights, of sum 1.
-    pub weights: [f32; 8],
-}
 
 /// Triangles with colours, in the object frame at rest.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -26,7 +20,7 @@ pub struct DisplayMesh {
     /// Counter-clockwise from outside.
     pub triangles: Vec<[u32; 3]>,
     /// Nodes that move each vertex; empty for a rigid object.
-    pub bindings: Vec<NodeBinding>,
+    pub bindings: Vec<NodeWeights>,
 }
 
 impl RenderMesh {
@@ -44,11 +38,7 @@ impl RenderMesh {
             colours: vertex_colours(lod),
             roughness: roughness / lod.materials.len().max(1) as f32,
             triangles: lod.triangles.clone(),
-            bindings: lod
-                .embedding
-                .iter()
-                .map(|vertex| NodeBinding { nodes: vertex.nodes, weights: vertex.weights })
-                .collect(),
+            bindings: lod.embedding.clone(),
         })
     }
 }

@@ -6,13 +6,10 @@ use serde::{Deserialize, Serialize};
 
 use super::texture::TextureChart;
 use crate::camera::{
-    math::{LANES, V3},
+    math::V3,
     shade::{
         occlusion::self_visibility,
-        pattern::{
-            METALNESS, MaterialSample, PatternPoint, PatternPoints, SKY_VISIBILITY, VisualSample,
-            sample_visual,
-        },
+        pattern::{METALNESS, MaterialSample, PatternPoint, SKY_VISIBILITY, VisualSample, sample_visual},
     },
 };
 use softvt_geometry::{Aabb, basis_from_reference, mesh::Mesh, shape::Shape, union_find::UnionFind};
@@ -28,10 +25,12 @@ const MAX_ERROR_PIXELS: f32 = 0.25;
 const OCCLUSION_REACH: f64 = 0.12;
 
 /// A vertex as a weighted sum of the nodes of a soft body.
-#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
-pub(crate) struct NodeWeights {
-    pub(crate) nodes: [u32; 8],
-    pub(crate) weights: [f32; 8],
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct NodeWeights {
+    /// Indices of the nodes.
+    pub nodes: [u32; 8],
+    /// Their weights, of sum 1.
+    pub weights: [f32; 8],
 }
 
 /// One level of detail of a [`RenderMesh`](super::render_mesh::RenderMesh), in the object frame at rest.
@@ -57,7 +56,7 @@ pub(crate) struct Lod {
     /// Attachment of each vertex to a soft body; empty for rigid objects.
     pub(crate) embedding: Vec<NodeWeights>,
     /// Normal of each vertex relative to its triangles, from which the normals of a soft body follow when it deforms;
-    /// empty where they are those of the triangles.
+    /// empty where they are the triangles'.
     pub(crate) relative_normals: Vec<RelativeNormal>,
     /// Mean length of the edges, m.
     pub(crate) vertex_spacing: f32,
@@ -77,7 +76,7 @@ impl Lod {
     }
 }
 
-/// A vertex normal relative to the normal of the adjacent triangles, which differs from that of the surface where
+/// A vertex normal relative to the normal of the adjacent triangles, which differs from the surface's where
 /// triangles are of unequal size.
 #[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 pub(crate) struct RelativeNormal {
@@ -191,7 +190,7 @@ pub(crate) fn vertex_normals(positions: &[V3], triangles: &[[u32; 3]]) -> Vec<V3
 
 /// Builds a level of detail: splits vertices at creases, evaluates materials at them and raises their drawn relief.
 ///
-/// `material_ids` are those of the triangles. Patterns are filtered to `spacing`, m. With a `shape`, materials blend
+/// `material_ids` are by triangle. Patterns are filtered to `spacing`, m. With a `shape`, materials blend
 /// smoothly across their borders and ambient occlusion is baked in.
 pub(crate) fn bake_vertices(
     mesh: &Mesh,
@@ -286,14 +285,12 @@ fn blend_visuals(
     }
     let mut blends = vec![VisualSample { material: MaterialSample::zeros(), relief: 0.0 }; points.len()];
     for (id, shares) in shown {
-        for some in shares.chunks(LANES) {
-            let at: Vec<PatternPoint> = some.iter().map(|&(index, _)| points[index]).collect();
-            sample_visual(&visuals[id as usize], &PatternPoints::new(&at), spacing, |lane, sample| {
-                let (index, weight) = some[lane];
-                blends[index].material += sample.material * weight;
-                blends[index].relief += sample.relief * weight;
-            });
-        }
+        let at: Vec<PatternPoint> = shares.iter().map(|&(index, _)| points[index]).collect();
+        sample_visual(&visuals[id as usize], &at, spacing, |point, sample| {
+            let (index, weight) = shares[point];
+            blends[index].material += sample.material * weight;
+            blends[index].relief += sample.relief * weight;
+        });
     }
     blends
 }

@@ -281,13 +281,6 @@ mod tests {
         let volume = mesh.volume();
         let expected = std::f64::consts::PI * 0.05 * 0.05 * 0.02;
         assert!((volume / expected - 1.0).abs() < 2e-3, "{volume} {expected}");
-        let mut edges = std::collections::BTreeMap::new();
-        for t in &mesh.triangles {
-            for i in 0..3 {
-                let (a, b) = (t[i], t[(i + 1) % 3]);
-                *edges.entry((a.min(b), a.max(b))).or_insert(0) += if a < b { 1 } else { -1 };
-            }
-        }
-        assert!(edges.values().all(|&balance| balance == 0), "each edge occurs once in each direction");
+        assert_eq!(mesh.validate_closed(), Ok(()));
     }
 }

@@ -2,7 +2,7 @@
 
 use std::{
     collections::BTreeMap,
-    sync::{Arc, LazyLock},
+    sync::{Arc, LazyLock, OnceLock},
 };
 
 use super::{
@@ -61,7 +61,7 @@ const HIDDEN_DEPTH: f64 = 1.5e-3;
 ///
 /// Materials are functions of the object frame. They are evaluated once, into vertices, or into textures for surfaces
 /// with patterns or several materials, and filtered to the spacing of the samples; small images therefore do not alias.
-/// Coarser levels of detail are drawn where they look the same; those of shapes are built on first use.
+/// Coarser levels of detail are drawn where they look the same; the levels of shapes are built on first use.
 #[derive(Clone, Debug)]
 pub struct RenderMesh {
     levels: LevelChain,
@@ -187,7 +187,7 @@ impl RenderMesh {
         Self { levels: LevelChain(levels.collect()), full_levels: None }
     }
 
-    /// Number of levels.
+    /// Number of levels of detail.
     pub(crate) fn level_count(&self) -> usize {
         self.levels.0.len()
     }
@@ -308,7 +308,7 @@ impl LevelChain {
 /// The surface of a shape, from which levels of detail are built.
 #[derive(Debug)]
 struct ShapeSurface {
-    /// For error messages.
+    /// Name of the object, for error messages.
     name: String,
     material: Arc<SurfaceMaterial>,
     /// Data of the vertices for each visual; of a textured surface, those that textures do not contain.
@@ -319,6 +319,7 @@ struct ShapeSurface {
     cache: DiskCache,
     /// Key of shape, visuals and voxels.
     key: Option<CacheKey>,
+    longest_edge: OnceLock<f64>,
 }
 
 impl ShapeSurface {
@@ -339,7 +340,13 @@ impl ShapeSurface {
             key: cache.key("surface", &(shape, visuals, &voxels)),
             voxels,
             cache: cache.clone(),
+            longest_edge: OnceLock::new(),
         }
+    }
+
+    /// Longest edge of the bounds of the shape, m.
+    fn longest_edge(&self) -> f64 {
+        *self.longest_edge.get_or_init(|| self.material.shape.bounds().size().max())
     }
 
     /// The level of detail with `cells` along the longest edge.
@@ -356,7 +363,7 @@ impl ShapeSurface {
     /// Builds a level of detail without its textures.
     fn build_level(&self, cells: f64, is_finest: bool, is_simplified: bool) -> Result<Lod, CameraError> {
         let SurfaceMaterial { shape, visuals } = &*self.material;
-        let cell = shape.bounds().size().max() / cells;
+        let cell = self.longest_edge() / cells;
         let mesh = self.triangulate(cell);
         let mut material_ids: Vec<u16> =
             mesh.triangles.iter().map(|t| shape.material(&centroid(&mesh, t))).collect();
@@ -390,23 +397,23 @@ impl ShapeSurface {
         if matches!(shape, Shape::Mesh(_)) {
             return vec![CELLS[0]];
         }
-        let size = shape.bounds().size().max();
         let key = self.cache.key("wall", &self.key);
         let wall = key.as_ref().and_then(|key| self.cache.read(key)).unwrap_or_else(|| {
-            let is_meshed = self.primitives(size / CELLS[0]).is_none();
-            let wall = is_meshed.then(|| wall_below(shape, size / CELLS[0])).flatten();
+            let cell = self.longest_edge() / CELLS[0];
+            let is_meshed = self.primitives(cell).is_none();
+            let wall = is_meshed.then(|| wall_below(shape, cell)).flatten();
             // Kept however fast it was found: for many shapes that takes about the time from which on values are kept.
             key.iter().for_each(|key| self.cache.write(key, &wall));
             wall
         });
-        wall.map_or(CELLS.to_vec(), |wall| vec![size / wall])
+        wall.map_or(CELLS.to_vec(), |wall| vec![self.longest_edge() / wall])
     }
 
     fn triangulate(&self, cell: f64) -> Mesh {
         self.primitives(cell).unwrap_or_else(|| SurfaceMesh::from_shape(&self.material.shape, cell).mesh)
     }
 
-    /// The mesh of a shape that is made of primitives, where it is better than that of the surface mesher.
+    /// The mesh of a shape that is made of primitives, where it is better than the surface mesher's.
     fn primitives(&self, cell: f64) -> Option<Mesh> {
         let shape = &self.material.shape;
         // Textured faces of rigid shapes need no small triangles.

@@ -18,7 +18,7 @@ use wide::{bytemuck::cast, i32x8, u32x8};
 use super::lod::{CreasedMesh, Lod};
 use crate::camera::{
     math::{LANES, V3, Vec3x8, approx_log2, f32x8},
-    shade::pattern::{self, METALNESS, MaterialSample, PatternPoint, PatternPoints, sample_visual},
+    shade::pattern::{self, METALNESS, MaterialSample, PatternPoint, sample_visual},
 };
 use softvt_geometry::{mesh::Mesh, shape::Shape, union_find::UnionFind};
 use softvt_scene::Visual;
@@ -38,7 +38,7 @@ const TEXT_TEXEL: f32 = 0.3e-3;
 const TEXELS_PER_FEATURE: f32 = 8.0;
 /// Minimum number of texels across a chart at its coarsest level, if it has as many at the finest.
 const MIN_TEXELS_ACROSS: usize = 4;
-/// Finest level whose tiles are the means of 4 × 4 painted points per texel. Those of finer levels, which have more
+/// Finest level whose tiles are the means of 4 × 4 painted points per texel. Tiles of finer levels, which have more
 /// texels, are the means of 2 × 2.
 const FIRST_DENSE_LEVEL: usize = 4;
 /// Level to whose texels patterns are filtered at most: layers of labels are thin, and a wider filter would let the
@@ -299,13 +299,9 @@ impl TextureChart {
             let [x, y] = [0, 1].map(|axis| (at[axis] as f32 + 0.5).min(last[axis]));
             PatternPoint { p: self.origin + (self.u * x + self.v * y) * texel, n: self.n }
         };
-        let mut texels = vec![Texel::default(); width * height];
-        for (block, some) in texels.chunks_mut(LANES).enumerate() {
-            let at: Vec<PatternPoint> = (0..some.len()).map(|lane| point(LANES * block + lane)).collect();
-            sample_visual(visual, &PatternPoints::new(&at), filter, |lane, sample| {
-                some[lane] = texel_of(&sample.material);
-            });
-        }
+        let points: Vec<PatternPoint> = (0..width * height).map(point).collect();
+        let mut texels = Vec::with_capacity(points.len());
+        sample_visual(visual, &points, filter, |_, sample| texels.push(texel_of(&sample.material)));
         texels
     }
 
@@ -324,26 +320,23 @@ impl TextureChart {
         }
         let SurfaceMaterial { shape, visuals } = material;
         // The painted texels of each material.
-        let mut shown: BTreeMap<usize, Vec<PaintedTexel>> = BTreeMap::new();
+        let mut shown: BTreeMap<usize, PaintedTexels> = BTreeMap::new();
         for (index, point) in points.iter().enumerate() {
             let Some(SurfacePoint { position, normal, .. }) = point else { continue };
             // Paint follows the surface, which triangles cut short.
             let on_surface = || shape.nearest_to_first_order(&position.cast());
             let id = if visuals.len() > 1 { shape.material(&on_surface()) as usize } else { 0 };
             let n = normal.try_normalize(0.0).unwrap_or_else(V3::z);
-            let point = PatternPoint { p: *position, n };
-            shown.entry(id).or_default().push(PaintedTexel { index, point });
+            let painted = shown.entry(id).or_default();
+            painted.indices.push(index);
+            painted.points.push(PatternPoint { p: *position, n });
         }
         let mut texels = vec![None; points.len()];
         let default = Visual::default();
-        for (id, painted) in shown {
-            for some in painted.chunks(LANES) {
-                let at: Vec<PatternPoint> = some.iter().map(|texel| texel.point).collect();
-                let visual = visuals.get(id).unwrap_or(&default);
-                sample_visual(visual, &PatternPoints::new(&at), filter, |lane, sample| {
-                    texels[some[lane].index] = Some(texel_of(&sample.material));
-                });
-            }
+        for (id, PaintedTexels { indices, points }) in shown {
+            sample_visual(visuals.get(id).unwrap_or(&default), &points, filter, |point, sample| {
+                texels[indices[point]] = Some(texel_of(&sample.material));
+            });
         }
         fill_gaps(texels, size)
     }
@@ -355,16 +348,17 @@ struct TexelRegion {
     texel: f32,
     /// Size to which patterns are filtered, m.
     filter: f32,
-    /// The first texel.
+    /// Column and row of the first texel.
     corner: [usize; 2],
     /// Width and height, texels.
     size: [usize; 2],
 }
 
-/// A texel that shows a surface, and the point that it shows.
-struct PaintedTexel {
-    index: usize,
-    point: PatternPoint,
+/// Texels that show a surface, and the points that they show.
+#[derive(Default)]
+struct PaintedTexels {
+    indices: Vec<usize>,
+    points: Vec<PatternPoint>,
 }
 
 /// The components of a material that textures store.
@@ -690,8 +684,8 @@ mod tests {
         for (uvs, (t, &chart)) in lod.uvs.iter().zip(lod.triangles.iter().zip(&lod.chart_ids)) {
             let middle = t.iter().map(|&v| lod.positions[v as usize]).sum::<V3>() / 3.0;
             let mut expected = 0.0;
-            let at = PatternPoints::new(&[PatternPoint { p: middle, n: middle.normalize() }]);
-            sample_visual(&printed(), &at, 1e-3, |_, sample| expected = sample.material[0]);
+            let at = PatternPoint { p: middle, n: middle.normalize() };
+            sample_visual(&printed(), &[at], 1e-3, |_, sample| expected = sample.material[0]);
             if (0.02..=0.98).contains(&expected) {
                 continue;
             }

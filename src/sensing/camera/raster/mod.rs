@@ -55,7 +55,7 @@ mod tests {
         block.triangles().for_each(|t: TriangleSetup| samples.draw(&t));
     }
 
-    /// Triangle ids of all samples: those of the colours, then those of the centres.
+    /// Triangle ids of all samples: the colours', then the centres'.
     fn ids(samples: &TileSamples) -> Vec<u32> {
         let places = || (0..TILE_EDGE).flat_map(|y| (0..TILE_EDGE).step_by(8).map(move |x| (x, y)));
         let colours = places().flat_map(|(x, y)| samples.colour_ids(x, y));

@@ -108,7 +108,7 @@ impl SampleChunk<'_> {
 /// A linear function of the position of samples. Both triangles of an edge evaluate it alike, up to the sign.
 #[derive(Clone, Copy)]
 struct ChunkPlane {
-    /// Change per column.
+    /// Change per column of pixels.
     slope: f32x8,
     /// Change from the start of a row to the samples in it.
     in_row: f32x8,

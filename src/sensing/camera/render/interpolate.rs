@@ -306,7 +306,7 @@ mod tests {
 
     #[test]
     fn a_pixel_next_to_a_sliver_shows_its_nearest_point_and_not_a_far_corner() {
-        // Clamped barycentric coordinates of a point off the middle line are those of a point far along the sliver.
+        // Clamped barycentric coordinates of a point off the middle line belong to a point far along the sliver.
         let corners = [[60.0, 100.0], [160.0, 100.0], [150.0, 100.2]];
         let sliver = triangle(corners);
         for (x, y) in [(100.0, 99.0), (100.0, 101.0), (130.0, 98.0), (80.0, 103.0)] {

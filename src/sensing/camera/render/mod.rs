@@ -9,7 +9,8 @@ pub(crate) mod tile;
 
 use background::{BackgroundTile, CachedBackground};
 use moving::MovingObjects;
-use pass::{Channels, PosedObject, RenderPass};
+pub use pass::Channels;
+use pass::{PosedObject, RenderPass};
 use tile::{PreparedTriangles, TileDisplay, TileRect, TileResolver, is_all_moving};
 
 use super::{
@@ -42,7 +43,7 @@ pub struct Renderer {
 
 impl Renderer {
     /// A renderer for single images: it keeps no backgrounds, which take some 130 bytes per pixel. Its images are
-    /// byte-identical to those of a renderer that keeps them.
+    /// byte-identical to the images of a renderer that keeps them.
     pub fn without_backgrounds() -> Self {
         Self { is_transient: true, ..Self::default() }
     }
@@ -60,37 +61,14 @@ impl Renderer {
         view: &FrameView,
         camera: &Camera,
     ) -> Result<RenderedImage, CameraError> {
-        self.draw(scene, view, camera, Channels::All)
+        self.render_channels(scene, view, camera, Channels::All)
     }
 
-    /// As [`render`](Self::render), faster, but with the same colours alone: depth and segmentation are empty.
+    /// As [`render`](Self::render), but with some channels of the same image alone; the others are empty.
     ///
     /// # Errors
     /// As [`render`](Self::render).
-    pub fn render_rgb(
-        &mut self,
-        scene: &RenderScene,
-        view: &FrameView,
-        camera: &Camera,
-    ) -> Result<RenderedImage, CameraError> {
-        self.draw(scene, view, camera, Channels::Colours)
-    }
-
-    /// As [`render`](Self::render), several times faster, but with the same depth and segmentation alone:
-    /// there are no colours.
-    ///
-    /// # Errors
-    /// As [`render`](Self::render).
-    pub fn render_segmentation(
-        &mut self,
-        scene: &RenderScene,
-        view: &FrameView,
-        camera: &Camera,
-    ) -> Result<RenderedImage, CameraError> {
-        self.draw(scene, view, camera, Channels::Centres)
-    }
-
-    fn draw(
+    pub fn render_channels(
         &mut self,
         scene: &RenderScene,
         view: &FrameView,

@@ -1,26 +1,18 @@
 //! The moving objects in the state of the last image. The images of all cameras in that state share their meshes and
 //! shadows.
 
-use std::sync::Arc;
-
 use super::pass::PosedObject;
 use crate::camera::{
-    error::CameraError,
-    mesh::lod::Lod,
-    scene::{FrameView, PosedMesh, RenderObject, RenderScene},
+    scene::{FrameView, PosedMeshes, RenderScene, RestState},
     shade::shadow::ShadowMap,
 };
-use softvt_geometry::{Pose, Vec3};
 
 /// The moving objects of a scene in one state.
 #[derive(Debug)]
 pub(crate) struct MovingObjects {
-    nodes: Vec<Vec<Vec3>>,
-    rigid: Vec<Pose>,
-    links: Vec<Vec<Pose>>,
+    state: RestState,
     node_colours: Vec<Vec<[f32; 3]>>,
-    /// The posed meshes, by object and level of detail.
-    meshes: Vec<Vec<Option<Arc<PosedMesh>>>>,
+    pub(crate) meshes: PosedMeshes,
     shadow: ShadowMap,
     /// Segmentation id that the shadows leave out; `None` if they are not drawn yet.
     shadow_hidden_id: Option<u16>,
@@ -29,11 +21,9 @@ pub(crate) struct MovingObjects {
 impl MovingObjects {
     pub(crate) fn new(scene: &RenderScene) -> Self {
         Self {
-            nodes: Vec::new(),
-            rigid: Vec::new(),
-            links: Vec::new(),
+            state: RestState::default(),
             node_colours: Vec::new(),
-            meshes: scene.objects.iter().map(|object| vec![None; object.mesh.level_count()]).collect(),
+            meshes: PosedMeshes::new(&scene.objects),
             shadow: ShadowMap::new(&scene.lighting),
             shadow_hidden_id: None,
         }
@@ -41,35 +31,20 @@ impl MovingObjects {
 
     /// Adopts a state: what was made of another one is dropped.
     pub(crate) fn adopt(&mut self, view: &FrameView) {
-        let is_same = self.nodes == view.nodes
-            && self.rigid == view.rigid
-            && self.links == view.links
+        let RestState { nodes, rigid, links } = &mut self.state;
+        let is_same = nodes == view.nodes
+            && rigid == view.rigid
+            && links == view.links
             && self.node_colours == view.node_colours;
         if is_same {
             return;
         }
-        view.nodes.clone_into(&mut self.nodes);
-        view.rigid.clone_into(&mut self.rigid);
-        view.links.clone_into(&mut self.links);
+        view.nodes.clone_into(nodes);
+        view.rigid.clone_into(rigid);
+        view.links.clone_into(links);
         view.node_colours.clone_into(&mut self.node_colours);
-        self.meshes.iter_mut().flatten().for_each(|mesh| *mesh = None);
+        self.meshes.clear();
         self.shadow_hidden_id = None;
-    }
-
-    /// A level of detail of object `index` in the adopted state.
-    pub(crate) fn mesh(
-        &mut self,
-        index: usize,
-        object: &RenderObject,
-        level: usize,
-        lod: &Lod,
-        view: &FrameView,
-    ) -> Result<Arc<PosedMesh>, CameraError> {
-        let mesh = &mut self.meshes[index][level];
-        match mesh {
-            Some(known) => Ok(known.clone()),
-            None => Ok(mesh.insert(Arc::new(PosedMesh::new(object, lod, view)?)).clone()),
-        }
     }
 
     /// Draws the shadows of `objects`, unless they are known.

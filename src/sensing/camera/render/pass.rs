@@ -43,16 +43,15 @@ impl<'a> PosedObject<'a> {
         is_still: bool,
         view: &FrameView,
         lens: &Lens,
-        moving: &mut MovingObjects,
+        moving: &MovingObjects,
     ) -> Result<Self, CameraError> {
         let (object, is_moving) = (&scene.objects[index], !is_still);
         let mesh = &object.mesh;
-        let mut pose = |level: usize| {
+        let pose = |level: usize| {
             let lod = mesh.level(level)?;
-            let posed = if is_moving {
-                moving.mesh(index, object, level, lod, view)?
-            } else {
-                scene.still_mesh(index, level)?
+            let posed = match is_moving {
+                true => moving.meshes.get(&scene.objects, index, level, view)?,
+                false => scene.still_mesh(index, level)?,
             };
             Ok(MeshInstance { lod, posed })
         };
@@ -113,12 +112,14 @@ pub(crate) struct RenderPass<'a> {
     pub(crate) channels: Channels,
 }
 
-/// Contents of an image.
+/// Channels of an image.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) enum Channels {
+pub enum Channels {
+    /// Colour, depth and segmentation.
     All,
+    /// Colour alone, which takes less time.
     Colours,
-    /// Depth and segmentation.
+    /// Depth and segmentation alone, sampled at the centres of pixels: several times faster.
     Centres,
 }
 

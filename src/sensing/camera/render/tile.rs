@@ -547,7 +547,7 @@ type RecentTriangles<'a> = [Option<TriangleInterpolator<'a>>; RECENT];
 #[derive(Default)]
 pub(crate) struct PreparedTriangles<'a> {
     recent: RecentTriangles<'a>,
-    /// Empty between tiles.
+    /// Pixels that wait for shading; empty between tiles.
     batch: ShadingBatch<'a>,
 }
 

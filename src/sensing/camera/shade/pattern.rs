@@ -31,24 +31,23 @@ pub(crate) struct VisualSample {
 pub(crate) struct PatternPoint {
     /// Position, object frame, m.
     pub(crate) p: V3,
-    /// Unit normal.
+    /// Unit normal, object frame.
     pub(crate) n: V3,
 }
 
 /// Points of surfaces at which a visual is evaluated together.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct PatternPoints {
+struct PatternPoints {
     /// Positions, object frame, m.
-    pub(crate) p: Vec3x8,
-    /// Unit normals.
-    pub(crate) n: Vec3x8,
+    p: Vec3x8,
+    /// Unit normals, object frame.
+    n: Vec3x8,
     /// Number of lanes that are used.
-    pub(crate) count: usize,
+    count: usize,
 }
 
 impl PatternPoints {
     /// One to eight points; further lanes repeat the last one.
-    pub(crate) fn new(points: &[PatternPoint]) -> Self {
+    fn new(points: &[PatternPoint]) -> Self {
         let lanes = |of: fn(&PatternPoint) -> V3| {
             let component =
                 |axis: usize| std::array::from_fn(|lane| of(&points[lane.min(points.len() - 1)])[axis]);
@@ -90,37 +89,40 @@ const DISTANCE_MARGIN: f32 = 2.0;
 /// Depth below the surface at which patterns are evaluated, m: a face on the border of a pattern shows the inner side.
 const SAMPLE_DEPTH: f32 = 2e-5;
 
-/// Evaluates `visual` at points of surfaces, and passes the sample of each lane to `take`.
+/// Evaluates `visual` at points of surfaces, eight at a time, and passes the sample of each to `take` in their order.
 ///
 /// Details finer than `spacing` (m) along the surface are averaged.
 pub(crate) fn sample_visual(
     visual: &Visual,
-    at: &PatternPoints,
+    points: &[PatternPoint],
     spacing: f32,
     mut take: impl FnMut(usize, VisualSample),
 ) {
-    let at = &PatternPoints { p: at.p - at.n * f32x8::splat(SAMPLE_DEPTH), ..*at };
-    let [r, g, b] = visual.albedo;
-    let mut material = [r, g, b, visual.roughness].map(|x| f32x8::splat(x as f32));
-    if let Some(colours) = &visual.colours {
-        let tint = |channel: usize| at.each(|p, _| colours.at(&p.cast(), f64::from(spacing))[channel]);
-        (0..3).for_each(|channel| material[channel] *= tint(channel));
-    }
-    let mut relief = f32x8::ZERO;
-    for layer in &visual.layers {
-        let mask = mask_value(&layer.mask, at, spacing);
-        let alpha = mask * f32x8::splat(layer.opacity as f32);
-        let [r, g, b] = layer.albedo;
-        for (value, target) in material.iter_mut().zip([r, g, b, layer.roughness]) {
-            *value += (f32x8::splat(target as f32) - *value) * alpha;
+    for (block, points) in points.chunks(LANES).enumerate() {
+        let mut at = PatternPoints::new(points);
+        at.p = at.p - at.n * f32x8::splat(SAMPLE_DEPTH);
+        let [r, g, b] = visual.albedo;
+        let mut material = [r, g, b, visual.roughness].map(|x| f32x8::splat(x as f32));
+        if let Some(colours) = &visual.colours {
+            let tint = |channel: usize| at.each(|p, _| colours.at(&p.cast(), f64::from(spacing))[channel]);
+            (0..3).for_each(|channel| material[channel] *= tint(channel));
         }
-        relief += mask * f32x8::splat(layer.relief_m as f32);
-    }
-    let (material, relief) = (material.map(f32x8::to_array), relief.to_array());
-    for lane in 0..at.count {
-        let [r, g, b, roughness] = material.map(|values| values[lane]);
-        let material = MaterialSample::from([r, g, b, roughness, visual.metalness as f32, 1.0]);
-        take(lane, VisualSample { material, relief: relief[lane] });
+        let mut relief = f32x8::ZERO;
+        for layer in &visual.layers {
+            let mask = mask_value(&layer.mask, &at, spacing);
+            let alpha = mask * f32x8::splat(layer.opacity as f32);
+            let [r, g, b] = layer.albedo;
+            for (value, target) in material.iter_mut().zip([r, g, b, layer.roughness]) {
+                *value += (f32x8::splat(target as f32) - *value) * alpha;
+            }
+            relief += mask * f32x8::splat(layer.relief_m as f32);
+        }
+        let (material, relief) = (material.map(f32x8::to_array), relief.to_array());
+        for lane in 0..at.count {
+            let [r, g, b, roughness] = material.map(|values| values[lane]);
+            let material = MaterialSample::from([r, g, b, roughness, visual.metalness as f32, 1.0]);
+            take(LANES * block + lane, VisualSample { material, relief: relief[lane] });
+        }
     }
 }
 
@@ -140,7 +142,7 @@ pub(crate) fn finest_feature(visual: &Visual) -> f32 {
             }
             Mask::Inverse { mask } => mask_feature(mask),
             Mask::Inside { soft_m, .. } => *soft_m,
-            // Varies with the normal only, whose detail is that of the mesh.
+            // Varies with the normal only, whose detail is the mesh's.
             Mask::Facing { .. } => f64::INFINITY,
             // Sharp edges.
             _ => 0.0,

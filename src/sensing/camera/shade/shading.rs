@@ -41,7 +41,7 @@ pub(crate) struct DirectAndAmbient {
 pub(crate) struct ReflectedLight {
     /// Diffuse radiance of a white surface.
     pub(crate) diffuse: Vec3x8,
-    /// Specular radiance.
+    /// Specular radiance, linear RGB.
     pub(crate) specular: Vec3x8,
 }
 

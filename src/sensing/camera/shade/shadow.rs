@@ -292,7 +292,7 @@ impl ShadowMap {
 /// The light that a filter lets pass.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct FilteredLight {
-    /// Visible fraction.
+    /// Visible fraction of the light, 0 to 1.
     visible: f32,
     /// Radius of the filter, texels; infinite where nothing or everything occludes.
     radius: f32,

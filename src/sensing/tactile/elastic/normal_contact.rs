@@ -114,7 +114,7 @@ fn apply_compliance(gel: &Gel, pressure: &[f32], out: &mut [f32], scratch: &mut 
     gel.fft.inverse(spectrum, out, buffers);
 }
 
-/// Compliance of waves a few thicknesses long, m/Pa: that of the Winkler foundation for the first guess.
+/// Compliance of waves a few thicknesses long, m/Pa, for the Winkler foundation of the first guess.
 fn foundation_compliance(gel: &Gel, scratch: &GelScratch) -> f32 {
     let size = (gel.fft.width * gel.fft.height) as f32;
     let wave = (1.0 / gel.pad.thickness) as f32;

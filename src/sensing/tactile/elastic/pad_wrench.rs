@@ -43,7 +43,7 @@ impl PadWrench {
 /// Coefficient of friction of a contact patch: the mean over its points, weighted by normal force.
 /// `None` without a force.
 ///
-/// The coefficient of a point is that of the pair of pad and body (the larger of both), static or,
+/// The coefficient of a point belongs to the pair of pad and body (the larger of both), static or,
 /// while they slide, dynamic.
 pub fn patch_friction(patch: &ContactPatch) -> Option<f64> {
     let sum = patch.points.iter().fold([0.0; 2], |[bound, force], point| {

@@ -11,8 +11,8 @@ pub struct SubstrateCompliance {
 }
 
 impl SubstrateCompliance {
-    /// Adds the compliance of the body, in series, to the spectrum of that of a gel, which is divided by the `size` of
-    /// the transform; `wave_numbers` are those of its entries, 1/m.
+    /// Adds the body's compliance, in series, to the spectrum of a gel's compliance, which is divided by the `size` of
+    /// the transform; `wave_numbers` are by entry, 1/m.
     pub(super) fn add_to(&self, compliance: &mut [f32], wave_numbers: &[f32], size: usize) {
         let resolved_k = std::f64::consts::TAU / self.resolved;
         for (total, &k) in compliance.iter_mut().zip(wave_numbers) {

@@ -220,7 +220,7 @@ impl TangentialProblem<'_> {
     }
 }
 
-/// Replaces the spectra of shear tractions by those of the tangential displacements.
+/// Replaces the spectra of shear tractions by the spectra of the tangential displacements.
 pub(super) fn apply_shear_kernel(gel: &Gel, sx: &mut [Complex32], sy: &mut [Complex32]) {
     let [xx, xy, yy] = &gel.kernels.tangential;
     for i in 0..sx.len() {

@@ -129,11 +129,11 @@ const DOT_RADIUS: f32 = 2.6;
 /// Drawing of an arrow.
 struct ArrowStyle {
     colour: [u8; 3],
-    /// Length of a drawn arrow over that of the motion, which is mostly below a few pixels.
+    /// Length of a drawn arrow over the motion's, which is mostly below a few pixels.
     gain: f32,
     /// Half the width of the line, px.
     line_radius: f32,
-    /// Length of the head over that of the arrow.
+    /// Length of the head over the arrow's.
     head: f32,
 }
 

@@ -49,3 +49,18 @@ return softvt.policy { name = 'p', act = function() pose.closure = 1 return pose
 
 -- Without the drives, the width is the one of a real hand.
 return softvt.policy { name = 'p', act = function(obs) assert(obs.width == 0.0624) pose.closure = 1 return pose end }
+
+local sources = require 'strain_sources'
+return softvt.policy { name = 'p', privileged = true, act = function() pose.closure = 0 return pose end }
+
+local grasp = require 'experts.grasp'
+return softvt.policy { name = 'p', privileged = true, act = function() pose.closure = 0 return pose end }
+
+local cube = require 'assets.cube'
+return softvt.policy { name = 'p', privileged = true, act = function() pose.closure = 0 return pose end }
+
+local limits = softvt.calibration 'cube'
+return softvt.policy { name = 'p', privileged = true, act = function() pose.closure = 0 return pose end }
+
+local soft = softvt.soft { youngs_pa = 1e4, poisson = 0.3, density = 300 }
+return softvt.policy { name = 'p', privileged = true, act = function() pose.closure = 0 return pose end }

@@ -35,3 +35,9 @@ local two, block, wall = scene:object 'two', scene:object 'block', scene:object 
 assert(math.abs(two:mass() - 0.9) < 1e-9 and math.abs(two:mass 'drawer' - 0.3) < 1e-9, two:mass())
 assert(math.abs(block:mass() - 0.06) < 1e-9 and wall:mass() == nil, block:mass())
 two:mass 'drawr'
+
+scene:add { name = 'chest', asset = chest, at = { 1, 0 }, joints = { drawer = 0.04 } }
+assert(scene:object('chest').joints.drawer == 0.04)
+
+scene:add { name = 'chest', asset = chest, at = { 1, 0 } }
+assert(scene:object('chest').joints.drawer == 0)

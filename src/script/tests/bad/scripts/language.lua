@@ -123,3 +123,9 @@ next { [{}] = 1, [print] = 2 }
 
 local t = { a = 1 }
 next(t, 'b')
+
+-- main: a/long/path/of/folders/that/lua/shortens/in/all/of/its/messages/x.lua
+error 'oh'
+
+coroutine.wrap(function()
+  coroutine.wrap(function() error 'oh' end)() end)()

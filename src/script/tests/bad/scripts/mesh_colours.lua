@@ -36,4 +36,29 @@ map_Kd /home/me/wood.png
 
 visuals = nil
 -- file: c.mtl
+newmtl a
+map_Kd C:\me\wood.png
+
+visuals = nil
+-- file: c.mtl
+newmtl a
+map_Kd https://example.org/wood.png
+
+visuals = nil
+-- file: c.mtl
+newmtl a
+map_Kd ../../wood.png
+
+visuals = nil
+-- file: c.mtl
+newmtl a
+map_Kd x//..\./none.png
+
+visuals = nil
+-- file: c.mtl
+newmtl a
+map_Kd xxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxx.png
+
+visuals = nil
+-- file: c.mtl
 newmtl b

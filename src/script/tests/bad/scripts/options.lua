@@ -40,3 +40,29 @@ gap = point.gap
 
 -- argv: 0.3
 gap = point.gap
+
+-- argv: --closure 0.3
+closure = opt.closure
+
+-- argv: --closure=0.3
+closure = opt.closure
+
+closure = opt.closure, fast = opt.fast, shape = opt.shape, gap = point.gap
+
+-- argv: --gap-mm 42,40
+gap = point.gap
+
+-- argv: --gap_mm=42
+gap = point.gap
+
+-- argv: --fast
+fast = opt.fast
+
+-- argv: --fast=on
+fast = opt.fast
+
+-- argv: --no-fast
+fast = opt.fast
+
+-- argv: --shape sphere
+shape = opt.shape

@@ -3,7 +3,7 @@
 //!
 //! Here the shape of the gel is not elastic: the dent is a pyramid of Gaussian blurs. Colours come from a table over
 //! magnitude and direction of the slope; each entry is a quadratic polynomial of the pixel position at 640 × 480. The
-//! Mini's gel map is flat, adds no slope, and is not read. The files are those of the PyPI package `taxim`, with red
+//! Mini's gel map is flat, adds no slope, and is not read. The files are from the PyPI package `taxim`, with red
 //! and blue exchanged as there.
 
 use std::{f64::consts::PI, path::Path};
@@ -11,7 +11,7 @@ use std::{f64::consts::PI, path::Path};
 use image::{Rgb, RgbImage};
 
 use super::super::elastic::{Gel, GelField};
-use softvt_common::npy::{NpzError, read_npz_of};
+use softvt_common::npy::{NpyError, read_npz_of};
 use softvt_robot::tactile::IMAGE_SIZE;
 
 /// σ of the blurs of the pyramid, px of 320 × 240 (kernel sizes 201, 101, 51, 21, 11 and 5 at 640 × 480).
@@ -42,12 +42,12 @@ impl TaximOptics {
     ///
     /// # Errors
     /// Names the file and the key that is missing, of a wrong shape or type, or not finite.
-    pub fn load(folder: &Path) -> Result<Self, NpzError> {
+    pub fn load(folder: &Path) -> Result<Self, NpyError> {
         let path = folder.join("polycalib.npz");
         let bins = read_shaped(&path, "bins", &["i4", "i8"], &[], "[] of one number")?[0];
         if !(2.0..=MAX_BINS).contains(&bins) {
-            let what = format!("array \"bins\": expected 2..{MAX_BINS}, got {bins}");
-            return Err(NpzError::Content { path, what });
+            let reason = format_args!("array \"bins\": expected 2..{MAX_BINS}, got {bins}");
+            return Err(NpyError::new(&path, reason));
         }
         let bins = bins as usize;
         let channel = |key: &str| {
@@ -99,11 +99,11 @@ fn read_shaped(
     kinds: &[&str],
     shape: &[usize],
     expected: &str,
-) -> Result<Vec<f64>, NpzError> {
+) -> Result<Vec<f64>, NpyError> {
     let array = read_npz_of(path, key, kinds)?;
     if array.shape != shape {
-        let what = format!("array \"{key}\": expected the shape {expected}, got {:?}", array.shape);
-        return Err(NpzError::Content { path: path.into(), what });
+        let reason = format_args!("array \"{key}\": expected the shape {expected}, got {:?}", array.shape);
+        return Err(NpyError::new(path, reason));
     }
     Ok(array.values())
 }

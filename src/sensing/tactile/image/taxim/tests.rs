@@ -98,43 +98,19 @@ fn every_broken_array_is_named_with_its_file() {
     let (poly, pack) = ("polycalib.npz", "dataPack.npz");
     let mut short = grad(1.0);
     short.truncate(2000);
+    let bins = |dtype: &str, bytes: &[u8]| Some(npy(dtype, &[], bytes));
     for (file, key, by, what) in [
         (poly, "bins", None, "no array \"bins\"; the file has: grad_r, grad_g, grad_b"),
-        (poly, "grad_g", None, "no array \"grad_g\"; the file has: bins, grad_r, grad_b"),
         (pack, "f0", None, "no array \"f0\"; the file has: imgs, touch_center"),
-        (
-            poly,
-            "bins",
-            Some(npy("<i4", &[2], &[125, 0, 0, 0, 125, 0, 0, 0])),
-            "array \"bins\": expected the shape []",
-        ),
-        (poly, "bins", Some(npy("<i4", &[], &[255; 4])), "array \"bins\": expected 2..4096, got -1"),
-        (
-            poly,
-            "bins",
-            Some(npy("<i4", &[], &[9, 0, 0, 0])),
-            "array \"grad_b\": expected the shape [9, 9, 6]",
-        ),
-        (
-            poly,
-            "bins",
-            Some(npy("<f8", &[], &125.0_f64.to_le_bytes())),
-            "array \"bins\": expected type i4 or i8, got f8",
-        ),
-        (
-            poly,
-            "grad_r",
-            Some(npy("<f8", &[125, 6], &[0; 6000])),
-            "array \"grad_r\": expected the shape [125, 125, 6]",
-        ),
+        (poly, "bins", Some(npy("<i4", &[2], &[0; 8])), "array \"bins\": expected the shape []"),
+        (poly, "bins", bins("<i4", &[255; 4]), "array \"bins\": expected 2..4096, got -1"),
+        (poly, "bins", bins("<i4", &[9, 0, 0, 0]), "array \"grad_b\": expected the shape [9, 9, 6]"),
+        (poly, "bins", bins("<f8", &[0; 8]), "array \"bins\": expected type i4 or i8, got f8"),
         (poly, "grad_r", Some(npy("|O", &[1], &[0])), "array \"grad_r\": of type 'O'"),
         (poly, "grad_r", Some(npy(">f8", &[1], &[0; 8])), "array \"grad_r\": of type '>f8'"),
-        (poly, "grad_r", Some(npy("<i8", &[1], &[0; 8])), "array \"grad_r\": expected type f4 or f8, got i8"),
         (poly, "grad_b", Some(number(f64::NAN)), "array \"grad_b\": entry 93749 is NaN"),
-        (poly, "grad_b", Some(number(f64::INFINITY)), "array \"grad_b\": entry 93749 is inf"),
         (poly, "grad_r", Some(short), "array \"grad_r\": 1872 bytes do not fill the shape [125, 125, 6]"),
         (poly, "grad_r", Some(b"not an array".to_vec()), "array \"grad_r\": not an .npy array"),
-        (pack, "f0", Some(npy("<f8", &[1], &[0; 8])), "array \"f0\": expected type u1, got f8"),
         (
             pack,
             "f0",
@@ -207,13 +183,6 @@ fn the_table_is_read_at_size_and_direction_of_the_rise() {
     // The dent rises towards its middle: to the right on its left side.
     assert_eq!((red(140, 120), red(180, 120), red(160, 100), red(10, 10)), (110, 10, 10, 10));
     assert!(painted().render(&gel, None).iter().all(|&value| value == 10));
-}
-
-#[test]
-fn a_missing_file_is_named() {
-    let folder = tempfile::tempdir().expect("a folder");
-    let error = TaximOptics::load(folder.path()).expect_err("no files").to_string();
-    assert!(error.contains("polycalib.npz"), "{error}");
 }
 
 #[test]
