@@ -5,6 +5,7 @@ use maud::{Markup, html};
 use crate::{condition_effects::ConditionEffects, run_summary::RunSummary};
 use softvt_common::text::{counted, decimal};
 use softvt_evaluation::category::EpisodeCategory;
+use softvt_runs::record::EpisodeRecord;
 
 /// Number of episodes below which intervals are called wide.
 const FEW_EPISODES: usize = 30;
@@ -64,7 +65,8 @@ fn is_within(run: &RunSummary) -> bool {
 
 /// "tactile-servo drops 1 of 10."
 fn dropped(run: &RunSummary) -> Option<String> {
-    let drops = run.run.records.iter().filter(|record| !record.verdict.no_drop).count();
+    let is_dropped = |record: &&EpisodeRecord| record.outcome.is_valid() && !record.verdict.no_drop;
+    let drops = run.run.records.iter().filter(is_dropped).count();
     let all = run.run.records.len();
     (drops > 0).then(|| format!("{} drops {drops} of {all}.", run.run.manifest.policy))
 }

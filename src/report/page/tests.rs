@@ -6,7 +6,7 @@ use crate::run_summary::{
     summarize_runs,
     tests::{shift, stored},
 };
-use softvt_evaluation::verdict::TargetVerdict;
+use softvt_evaluation::verdict::{Outcome, TargetVerdict};
 use softvt_media::palette::{Colour, DROPPED, FAINT, OVER_LIMIT, SAFE};
 use softvt_policy::profile::Profile;
 use softvt_runs::{record::EpisodeRecord, stored_run::StoredRun};
@@ -212,6 +212,21 @@ fn text_and_marks_have_contrast_in_all_colour_schemes() {
         schemes += 1;
     }
     assert_eq!(schemes, 3);
+}
+
+#[test]
+fn invalid_episodes_are_not_told_as_drops() {
+    let mut records = episodes("suite", 4);
+    for record in &mut records[2..] {
+        record.verdict.no_drop = false;
+    }
+    let told =
+        |records: &[EpisodeRecord]| render(vec![stored("a", "pi", records.to_vec())]).contains("pi drops");
+    assert!(told(&records));
+    for record in &mut records[2..] {
+        record.outcome = Outcome::Error { message: "no actions".to_owned() };
+    }
+    assert!(!told(&records));
 }
 
 #[test]
