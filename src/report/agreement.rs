@@ -9,6 +9,7 @@ use crate::{
     cells,
     condition_table::ConditionOutcome,
     leaderboard, page,
+    policy_ranking::PolicyRanking,
     run_summary::{summarize_runs, tests::stored},
     sample_record,
     styled_text::TerminalFormat,
@@ -26,6 +27,7 @@ use softvt_evaluation::{
 use softvt_runs::{
     paired_stats::{PairedComparison, pair_episodes},
     record::EpisodeRecord,
+    requirement::Requirement,
     softvtbench_files,
 };
 
@@ -222,10 +224,8 @@ proptest! {
         let goal = count(&Played::is_goal);
         let safe = count(&|episode| episode.is_safe(NOMINAL_KAPPA));
         let is_soft = episodes.iter().any(Played::is_soft);
-        let is_all_soft = episodes.iter().all(Played::is_soft);
         let is_judged = episodes.iter().any(|episode| episode.is_soft() && episode.is_judged());
-        let safety = Some(percent(safe)).filter(|_| is_judged || !is_all_soft);
-        let shown_safety = safety.filter(|_| is_soft);
+        let safety = Some(percent(safe)).filter(|_| is_judged);
 
         let records: Vec<EpisodeRecord> =
             episodes.iter().enumerate().map(|(index, episode)| episode.record(index)).collect();
@@ -274,17 +274,17 @@ proptest! {
         let text = terminal::table(&run.summary, TerminalFormat::PLAIN);
         let all = text.lines().find(|line| line.trim_start().starts_with("all ")).unwrap();
         let cells: Vec<&str> = all.split_whitespace().take(3).collect();
-        let shown = shown_safety.map_or_else(|| "N/A".to_owned(), |_| format!("{safe}/{n}"));
+        let shown = safety.map_or_else(|| "N/A".to_owned(), |_| format!("{safe}/{n}"));
         prop_assert_eq!(cells, ["all", &format!("{goal}/{n}"), &shown]);
         let row = &tables::main_table(&runs).rows[0];
         let cell = |count: Option<usize>| count.map_or_else(|| "N/A".to_owned(), |c| cells::rate(&Rate::new(c, n)));
-        prop_assert_eq!([&row[3], &row[5]], [&cell(Some(goal)), &cell(shown_safety.map(|_| safe))]);
+        prop_assert_eq!([&row[3], &row[5]], [&cell(Some(goal)), &cell(safety.map(|_| safe))]);
 
         // The page: Goal and Safety, and the number of episodes of each category.
         let html = page::page(&runs, &page::Thumbnails::new(), Path::new("page"));
         let row = html.split("<td class=\"number\" data-head=\"Goal, %\">").nth(1).expect("a row of the run");
         prop_assert!(row.starts_with(&decimal(Some(percent(goal)), 0)), "{}", row);
-        let shown = shown_safety.map_or_else(|| "N/A".to_owned(), |safety| format!("<b>{safety:.0}"));
+        let shown = safety.map_or_else(|| "N/A".to_owned(), |safety| format!("<b>{safety:.0}"));
         let cell = row.split("data-head=\"Safety, %\">").nth(1).expect("Safety of the run");
         prop_assert!(cell.starts_with(&shown), "{}", cell);
         let counted = cell.split("class=\"counts\">").nth(1).expect("counts of the run");
@@ -294,19 +294,30 @@ proptest! {
             prop_assert!(counted.contains(&shown), "{} in {}", shown, counted);
         }
 
-        // The table of conditions, the comparison with itself, and the row of a leaderboard.
+        // The table of conditions, the comparison with itself, a ranking, and the row of a leaderboard.
         let condition = ConditionOutcome::new("a".into(), &records, None);
         prop_assert_eq!((condition.episodes, condition.invalid), (n, scores.invalid));
         prop_assert_eq!(condition.goal_success_rate.rate, Some(percent(goal)));
-        prop_assert_eq!((condition.safety_success_rate.rate, condition.d_over_tau), (shown_safety, scores.d_over_tau));
+        prop_assert_eq!((condition.safety_success_rate.rate, condition.d_over_tau), (safety, scores.d_over_tau));
         let paired = PairedComparison::from_pairs(&pair_episodes(&records, &records));
         let rounded = |rate: Option<f64>| rate.map(|rate| (1e9 * rate).round());
         prop_assert_eq!((paired.pairs, rounded(paired.goal.first)), (n, rounded(Some(percent(goal)))));
-        prop_assert!(!is_all_soft || rounded(paired.safety.first) == rounded(safety));
+        prop_assert_eq!(rounded(paired.safety.first), rounded(safety));
+        let of_run = || vec![stored("a", "pi", records.clone())];
+        let ranking = PolicyRanking::new(&[of_run(), of_run(), of_run()]).expect("common episodes");
+        let letters = |is_known: bool| if is_known { "a" } else { "" };
+        for ranked in &ranking.runs {
+            let found = (ranked.goal.rate, ranked.safety.rate, ranked.d_over_tau);
+            prop_assert_eq!(found, (Some(percent(goal)), safety, scores.d_over_tau.median));
+            let expected = [letters(safety.is_some()), letters(scores.d_over_tau.n > 0)];
+            prop_assert_eq!([&ranked.safety_letters, &ranked.d_over_tau_letters], expected);
+        }
         let row: Value = serde_json::from_str(leaderboard::rows(&runs).trim_end()).unwrap();
         let expected = [json!(n), json!(percent(goal)), json!(safety), json!(expected.median)];
         let found = [&row["episodes"], &row["goal"]["rate"], &row["safety"]["rate"], &row["d_peak_median"]];
         prop_assert_eq!(found, expected.each_ref());
+        let required = "safety>=0".parse::<Requirement>().expect("a requirement").unmet(&run.summary);
+        prop_assert_eq!(required.is_none(), safety.is_some() || !is_soft);
 
         // SoftVTBench knows one object, no drop, no slip and no missing step.
         let alone = |episode: &&Played| episode.moved.len() == 1 && !episode.moved[0].is_incomplete;

@@ -4,9 +4,10 @@ use softvt_common::text::decimal;
 use softvt_evaluation::statistics::{Distribution, Rate};
 use softvt_runs::summary::TauRange;
 
+/// A rate with its interval; "N/A" for none, such as Safety of rigid suites and what was never judged.
 pub(crate) fn rate(rate: &Rate) -> String {
     let bounds = rate.wilson95.map(|[low, high]| format!(" [{low:.1}, {high:.1}]")).unwrap_or_default();
-    rate.rate.map_or_else(|| "–".to_owned(), |value| format!("{value:.1}{bounds}"))
+    rate.rate.map_or_else(|| "N/A".to_owned(), |value| format!("{value:.1}{bounds}"))
 }
 
 /// A percentile of D, with two decimals; "∞" if it falls on an invalid episode.

@@ -69,7 +69,7 @@ fn effects_of_group(group: &[&RunSummary]) -> Option<ConditionEffects> {
         effects.push(ConditionEffect {
             point: TrendPoint {
                 value: change.value,
-                safety: run.scores().soft_safety_rate(),
+                safety: run.scores().safety_success_rate,
                 d_over_tau: run.pairs.iter().filter_map(|pair| pair.second.d_over_tau()).collect(),
             },
             change: change.clone(),
@@ -99,7 +99,7 @@ fn effects_of_group(group: &[&RunSummary]) -> Option<ConditionEffects> {
         method: reference.method.clone(),
         reference: TrendPoint {
             value: None,
-            safety: reference.summary.scores.soft_safety_rate(),
+            safety: reference.summary.scores.safety_success_rate,
             d_over_tau: reference_records.iter().filter_map(EpisodeRecord::d_over_tau).collect(),
         },
         mean_goal: mean(|record| record.verdict.goal),

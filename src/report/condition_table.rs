@@ -51,7 +51,7 @@ impl ConditionOutcome {
             invalid: scores.invalid,
             goal_success_rate: scores.goal_success_rate,
             no_drop_rate: scores.no_drop_rate,
-            safety_success_rate: scores.soft_safety_rate(),
+            safety_success_rate: scores.safety_success_rate,
             d_over_tau: scores.d_over_tau,
             paired,
         }

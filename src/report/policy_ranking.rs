@@ -30,12 +30,13 @@ pub struct RankedRun {
     /// Policy, or the folder if the policies have one name, with its privileged inputs.
     pub name: String,
     pub goal: Rate,
+    /// Not judged without a soft target.
     pub safety: Rate,
     /// Median of peak D over τ.
     pub d_over_tau: Option<f64>,
-    /// Runs that share a letter do not differ in Safety Success (McNemar's test).
+    /// Runs that share a letter do not differ in Safety Success (McNemar's test); empty for a run without it.
     pub safety_letters: String,
-    /// Runs that share a letter do not differ in D/τ (Wilcoxon's signed-rank test).
+    /// Runs that share a letter do not differ in D/τ (Wilcoxon's signed-rank test); empty for a run without it.
     pub d_over_tau_letters: String,
 }
 
@@ -92,7 +93,11 @@ impl PolicyRanking {
             let p_values: Vec<f64> = compared.iter().map(|pair| of(pair).p.unwrap_or(1.0)).collect();
             let adjusted = holm(&p_values);
             let at = |a: usize, b: usize| pairs.iter().position(|pair| *pair == [a.min(b), a.max(b)]);
-            letters(count, |a, b| at(a, b).is_some_and(|at| adjusted[at] < LEVEL))
+            let letters = letters(count, |a, b| at(a, b).is_some_and(|at| adjusted[at] < LEVEL));
+            let is_compared =
+                |run| pairs.iter().zip(&compared).any(|(pair, by)| pair.contains(&run) && of(by).n > 0);
+            let of_run = |(run, own)| if is_compared(run) { own } else { String::new() };
+            letters.into_iter().enumerate().map(of_run).collect::<Vec<_>>()
         };
         let letters = letters_of(|of| &of.safety).into_iter().zip(letters_of(|of| &of.d_over_tau));
         let runs =
@@ -143,6 +148,6 @@ impl PolicyRanking {
 fn interval(rate: &Rate) -> String {
     match rate.wilson95 {
         Some([low, high]) => format!("{} [{low:.0}, {high:.0}]", decimal(rate.rate, 0)),
-        None => decimal(rate.rate, 0),
+        None => "N/A".to_owned(),
     }
 }

@@ -176,9 +176,9 @@ fn task_columns<'a>(format: TerminalFormat) -> Vec<Column<'a, TaskRow<'a>>> {
         Column::number("#", |row: &TaskRow| row.number.clone()).width(3),
         Column::text("object", |row: &TaskRow| row.name.to_owned()).width(room.clamp(12, 40)),
         number("goal", 7, |s| format!("{}/{}", s.goal_success_rate.count, s.episodes)),
-        number("safe", 7, |s| match s.is_soft() && s.safety_success_rate.rate.is_some() {
-            true => format!("{}/{}", s.count(EpisodeCategory::Safe), s.episodes),
-            false => "N/A".to_owned(),
+        number("safe", 7, |s| match s.safety_success_rate.rate {
+            Some(_) => format!("{}/{}", s.count(EpisodeCategory::Safe), s.episodes),
+            None => "N/A".to_owned(),
         }),
         number("D/limit", 8, |s| decimal(s.d_over_tau.median, 2)),
         number("collapsed", 9, |s| match s.collapsed_volume.mean {
@@ -292,10 +292,9 @@ fn push_failed(text: &mut StyledText, episodes: &[FailedEpisode], failure: &str,
 
 /// Smallest difference that this number of episodes can detect.
 fn push_resolution(text: &mut StyledText, scores: &GroupScores) {
-    let rate = if scores.is_soft() { scores.safety_success_rate } else { scores.goal_success_rate };
     let n = scores.episodes;
     let wide = if n < FEW_EPISODES { format!("n = {n}: intervals are wide; ") } else { String::new() };
-    match DetectableDifference::new(rate.count, n) {
+    match DetectableDifference::new(scores.main_rate().count, n) {
         Some(DetectableDifference { smallest, .. }) => {
             let (episodes, points) = (counted(n, "episode"), significant(smallest, 2));
             text.note(format_args!(

@@ -38,7 +38,7 @@ fn rates(summary: &SuiteSummary) -> Vec<Figure> {
         ("Goal Success (TSR)", Some(scores.goal_success_rate)),
         ("NoDrop", Some(scores.no_drop_rate)),
         ("Deformation within τ", scores.deformation_ok_rate),
-        ("Safety Success", scores.is_soft().then_some(scores.safety_success_rate)),
+        ("Safety Success", Some(scores.safety_success_rate)),
         ("DSR", scores.dsr),
     ] {
         let value = match rate.filter(|rate| rate.rate.is_some()) {
@@ -54,8 +54,8 @@ fn rates(summary: &SuiteSummary) -> Vec<Figure> {
     if scores.is_soft() {
         figures.push(("Goal–safety gap", format!("{:>6} pp", decimal(scores.goal_safe_gap, 1))));
     }
-    let safe = decimal(scores.contact_safety_rate.rate, 1);
-    let contact = interval(scores.contact_success_rate) + "  safe, no slip: " + &safe + " %";
+    let safe = scores.contact_safety_rate.rate.map(|safe| format!("  safe, no slip: {safe:.1} %"));
+    let contact = interval(scores.contact_success_rate) + &safe.unwrap_or_default();
     let Distribution { p5, median, p95, .. } = scores.grip_ratio;
     let [p5, median, p95] = [p5, median, p95].map(|ratio| decimal(ratio, 1));
     figures.extend([
@@ -111,8 +111,9 @@ fn harm_and_stages(summary: &SuiteSummary) -> Vec<Figure> {
         let stages = scores.failed_stages.iter().map(|(stage, count)| format!("{} {count}", stage.name()));
         figures.push(("Failed while", stages.collect::<Vec<_>>().join(" · ")));
     }
-    let safe = scores.safety_success_rate.count;
-    if let Some(DetectableDifference { smallest, found }) = DetectableDifference::new(safe, scores.episodes) {
+    let count = scores.main_rate().count;
+    if let Some(DetectableDifference { smallest, found }) = DetectableDifference::new(count, scores.episodes)
+    {
         let [smallest, found] = [smallest, found].map(|points| significant(points, 2));
         let found = format!("{smallest} points; in 4 of 5 cases {found}");
         figures.push(("Detectable difference", found));

@@ -54,8 +54,6 @@ pub struct Measure {
     /// Unit; empty for none.
     pub unit: &'static str,
     pub digits: usize,
-    /// True for a success that needs the limits of soft targets.
-    pub needs_limit: bool,
     pub about: &'static str,
     /// Its value in a summary.
     pub score: fn(&GroupScores) -> Option<Score>,
@@ -115,8 +113,9 @@ impl<'a> Episodes<'a> {
         self.records.iter().copied().filter(|r| r.has_soft_target())
     }
 
+    /// True if a soft target was judged: without one, what needs its limit has no rate.
     fn is_any_judged(&self) -> bool {
-        self.soft().any(EpisodeRecord::is_deformation_judged)
+        self.records.iter().any(|r| r.has_judged_soft_target())
     }
 
     fn metrics(&self) -> BTreeMap<String, Distribution> {
@@ -146,11 +145,9 @@ struct Pairs<'a> {
 }
 
 impl Pairs<'_> {
-    /// Pairs with soft targets; none if a run judged none of them, as in a summary.
-    fn judged(&self) -> impl Iterator<Item = [&EpisodeRecord; 2]> {
-        let soft = || self.records().filter(|pair| pair.iter().all(|r| r.has_soft_target()));
-        let is_judged = [0, 1].iter().all(|&run| soft().any(|pair| pair[run].is_deformation_judged()));
-        soft().filter(move |_| is_judged)
+    /// True if each run judged a soft target, as [`Episodes::is_any_judged`] of a summary.
+    fn is_any_judged(&self) -> bool {
+        [0, 1].iter().all(|&run| self.records().any(|pair| pair[run].has_judged_soft_target()))
     }
 
     fn metrics(&self) -> BTreeMap<String, PairedDifference> {
@@ -171,8 +168,6 @@ impl Pairs<'_> {
 
 /// A way to aggregate a value of records.
 trait Aggregate {
-    /// True if it needs the limits of soft targets.
-    const NEEDS_LIMIT: bool = false;
     type Score;
     fn score(&self, episodes: &Episodes<'_>, group: MeasureGroup) -> Self::Score;
     fn difference(&self, pairs: &Pairs<'_>) -> PairedDifference;
@@ -195,28 +190,18 @@ impl Aggregate for Success {
     }
 }
 
-/// A success that needs the limits of soft targets, and of rigid ones nothing. Not judged where all targets are soft
-/// and none was judged; compared over soft targets.
+/// As [`SoftSuccess`], and not judged without soft targets. Beside judged ones, rigid targets need no limit.
 struct SafeSuccess(fn(&EpisodeRecord) -> bool);
 
 impl Aggregate for SafeSuccess {
-    const NEEDS_LIMIT: bool = true;
     type Score = Rate;
 
     fn score(&self, episodes: &Episodes<'_>, group: MeasureGroup) -> Rate {
-        let is_all_soft = episodes.records.iter().all(|r| r.has_soft_target());
-        if is_all_soft && !episodes.is_any_judged() {
-            Rate::not_judged()
-        } else {
-            episodes.rate(self.0, group)
-        }
+        SoftSuccess(self.0).score(episodes, group).unwrap_or_default()
     }
 
     fn difference(&self, pairs: &Pairs<'_>) -> PairedDifference {
-        match pairs.judged().next() {
-            Some(_) => SoftSuccess(self.0).difference(pairs),
-            None => PairedDifference::default(),
-        }
+        SoftSuccess(self.0).difference(pairs)
     }
 }
 
@@ -224,7 +209,6 @@ impl Aggregate for SafeSuccess {
 struct SoftSuccess(fn(&EpisodeRecord) -> bool);
 
 impl Aggregate for SoftSuccess {
-    const NEEDS_LIMIT: bool = true;
     type Score = Option<Rate>;
 
     fn score(&self, episodes: &Episodes<'_>, group: MeasureGroup) -> Option<Rate> {
@@ -233,9 +217,7 @@ impl Aggregate for SoftSuccess {
     }
 
     fn difference(&self, pairs: &Pairs<'_>) -> PairedDifference {
-        PairedDifference::from_successes(
-            pairs.judged().map(|pair| pair.map(|r| r.outcome.is_valid() && (self.0)(r))),
-        )
+        if pairs.is_any_judged() { Success(self.0).difference(pairs) } else { PairedDifference::default() }
     }
 }
 
@@ -325,7 +307,6 @@ macro_rules! measures {
                 heading: $heading,
                 unit: $unit,
                 digits: $digits,
-                needs_limit: <$kind as Aggregate>::NEEDS_LIMIT,
                 about: $about,
                 score: measures!(@score [$($summary)?] [$($within)?]),
                 difference: measures!(@difference $($paired)?),

@@ -305,6 +305,11 @@ impl EpisodeRecord {
         self.soft_targets().next().is_some()
     }
 
+    /// True if an object that the goal moves is soft, and the deformation of each such object can be judged.
+    pub fn has_judged_soft_target(&self) -> bool {
+        self.has_soft_target() && self.is_deformation_judged()
+    }
+
     /// True if D stayed within the limit of each soft object that the goal moves, false if one is known to exceed its
     /// own; `None` where neither is known.
     pub fn is_within_limits(&self) -> Option<bool> {

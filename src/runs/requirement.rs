@@ -105,12 +105,13 @@ impl FromStr for Requirement {
 }
 
 impl Requirement {
-    /// Describes how a suite violates the requirement. `None` if it does not.
+    /// Describes how a suite violates the requirement. `None` if it does not, or if a rigid suite lacks the metric.
     pub fn unmet(&self, summary: &SuiteSummary) -> Option<String> {
         let (suite, text, name) = (&summary.suite, &self.text, self.metric.name);
         let Some(value) = (self.metric.value)(&summary.scores) else {
             let cause = match summary.scores.episodes {
                 0 => "there is no episode".to_owned(),
+                _ if !summary.scores.is_soft() => return None,
                 _ => format!("{name} is not defined for this suite"),
             };
             return Some(format!("{suite}: {text}: {cause}"));

@@ -30,10 +30,10 @@ fn rigid_targets_need_no_deformation_limit() {
         );
         assert!(verdict.object().mean_pad_force_n > 0.5, "{verdict:#?}");
     }
-    assert_eq!(result.summary.scores.safety_success_rate.rate, Some(100.0));
-    let binary = project.run("x.lua").policy("expert-binary").finish().result();
-    let rate = binary.summary.scores.safety_success_rate.rate;
-    assert_eq!(rate, Some(100.0), "a rigid block bears a binary gripper");
+    assert_eq!(result.summary.scores.safety_success_rate.rate, None, "no soft target was judged");
+    for record in project.run("x.lua").policy("expert-binary").records() {
+        assert!(record.verdict.safety, "a rigid block bears a binary gripper: {:#?}", record.verdict);
+    }
     for record in project.run("x.lua").policy("noop").records() {
         assert!(!record.verdict.goal && record.verdict.no_drop, "{:#?}", record.verdict);
     }

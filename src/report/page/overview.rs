@@ -55,7 +55,7 @@ struct BlindBound {
 
 /// The bound of a suite whose runs include such controllers.
 fn blind_bound(runs: &[RunSummary]) -> Option<BlindBound> {
-    let bounds = runs.iter().filter(|run| run.is_soft() && run.run.manifest.blind).filter_map(|run| {
+    let bounds = runs.iter().filter(|run| run.run.manifest.blind).filter_map(|run| {
         let safety = run.summary.scores.safety_success_rate.rate?;
         Some(BlindBound { policy: run.run.manifest.policy.clone(), safety })
     });
@@ -84,9 +84,7 @@ fn headings() -> Markup {
 fn row(run: &RunSummary, bound: Option<&BlindBound>) -> Markup {
     let scores = &run.summary.scores;
     let goal = scores.goal_success_rate;
-    let is_judged = run.is_soft() && scores.safety_success_rate.rate.is_some();
-    let safety = is_judged.then_some(scores.safety_success_rate);
-    let gap = scores.goal_safe_gap.filter(|_| is_judged);
+    let safety = Some(scores.safety_success_rate).filter(|safety| safety.rate.is_some());
     let count = run.run.records.len();
     html! {
         tr {
@@ -94,7 +92,7 @@ fn row(run: &RunSummary, bound: Option<&BlindBound>) -> Markup {
             td.text.chart data-head="Goal → Safety" { (dumbbell(goal, safety, scores.count(EpisodeCategory::OverLimit) > 0, bound)) }
             td.number data-head="Goal, %" { (rate(goal)) }
             td.number data-head="Safety, %" { @match safety { Some(safety) => b { (rate(safety)) }, None => "N/A" } }
-            td.number data-head="Gap" { (decimal(gap, 0)) }
+            td.number data-head="Gap" { (decimal(scores.goal_safe_gap, 0)) }
             td.number data-head="Collapsed" { (collapsed(scores.collapsed_volume.mean)) }
             td.number data-head="D/limit" { (decimal(scores.d_over_tau.median, 2)) }
             td.text data-head="Episodes" {

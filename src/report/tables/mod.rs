@@ -14,11 +14,7 @@ use softvt_common::{
     table::{Column, Table},
     text::{decimal, significant},
 };
-use softvt_evaluation::{
-    safety::KAPPAS,
-    stage::TaskStage,
-    statistics::{Distribution, Rate},
-};
+use softvt_evaluation::{safety::KAPPAS, stage::TaskStage, statistics::Distribution};
 use softvt_runs::{
     measures::{MEASURES, Measure, MeasureGroup, Score},
     summary::{CommandCounts, GroupScores, TaskScores},
@@ -26,12 +22,6 @@ use softvt_runs::{
 
 /// A column of a table with a row per run.
 type RunColumn<'a> = Column<'a, RunSummary>;
-
-/// As [`rate`]; "N/A" for rigid suites and for what was never judged.
-fn soft_rate(run: &RunSummary, scores: &GroupScores, of: &Rate) -> String {
-    let is_judged = of.rate.is_some() || scores.not_judged == 0;
-    if run.is_soft() && is_judged { rate(of) } else { "N/A".to_owned() }
-}
 
 /// Number of episodes, and of how many if the run is not finished.
 fn episodes(run: &RunSummary) -> String {
@@ -45,14 +35,6 @@ fn episodes(run: &RunSummary) -> String {
 
 fn score<'a>(heading: impl Into<String>, cell: impl Fn(&GroupScores) -> String + 'a) -> RunColumn<'a> {
     Column::number(heading, move |run: &RunSummary| cell(&run.summary.scores))
-}
-
-/// A column of a rate that rigid suites do not have.
-fn soft_score<'a>(heading: &str, of: fn(&GroupScores) -> Option<Rate>) -> RunColumn<'a> {
-    Column::number(heading, move |run: &RunSummary| {
-        let scores = &run.summary.scores;
-        of(scores).map_or_else(|| "N/A".to_owned(), |rate| soft_rate(run, scores, &rate))
-    })
 }
 
 /// A table with a row per run, with the names of its suite and method; `None` without a run.
@@ -105,18 +87,14 @@ pub fn main_table(runs: &[RunSummary]) -> Table {
     let caption = format!(
         "Success by suite and method, % of episodes with 95 % Wilson intervals. Safety Success requires the goal, no drop, and a peak deformation within the object's threshold; it does not apply to rigid objects.{slip}{needs} TSR is Goal Success; DSR is Goal Success with the deformation within the threshold, dropped or not."
     );
-    let gap = |run: &RunSummary| match run.is_soft() {
-        true => decimal(run.summary.scores.goal_safe_gap, 1),
-        false => "N/A".to_owned(),
-    };
     let columns = [
         Column::number("Episodes", episodes),
         score("Goal Success (TSR)", |s| rate(&s.goal_success_rate)),
         score("NoDrop", |s| rate(&s.no_drop_rate)),
-        soft_score("Safety Success", |s| Some(s.safety_success_rate)),
-        Column::number("Gap, pp", gap),
+        score("Safety Success", |s| rate(&s.safety_success_rate)),
+        score("Gap, pp", |s| decimal(s.goal_safe_gap, 1)),
         score("Invalid", |s| s.invalid.to_string()),
-        soft_score("DSR", |s| s.dsr),
+        score("DSR", |s| rate(&s.dsr.unwrap_or_default())),
         score("Not judged", |s| s.not_judged.to_string()),
     ];
     table_of(runs, &caption, columns).unwrap_or_default()
@@ -148,8 +126,7 @@ fn measure_columns<'a>(
             return statistics.iter().map(column).collect();
         }
         vec![Column::number(name, move |run: &RunSummary| match (measure.score)(run.scores()) {
-            Some(Score::Rate(of)) if measure.needs_limit => soft_rate(run, run.scores(), &of),
-            Some(Score::Rate(of)) => of.rate.map_or_else(|| "N/A".to_owned(), |_| rate(&of)),
+            Some(Score::Rate(of)) => rate(&of),
             Some(Score::Mean(mean)) => decimal(mean, 2),
             Some(Score::Distribution(_)) | None => "–".to_owned(),
         })]
@@ -260,9 +237,7 @@ pub fn task_table(run: &RunSummary) -> Table {
         score("Episodes", |s| s.episodes.to_string()),
         score("Goal", |s| rate(&s.goal_success_rate)),
         score("NoDrop", |s| rate(&s.no_drop_rate)),
-        Column::number("Safety", |task: &TaskScores| {
-            soft_rate(run, &task.scores, &task.scores.safety_success_rate)
-        }),
+        score("Safety", |s| rate(&s.safety_success_rate)),
         soft("D median, %", |s| Some(percentile(&s.deformation, s.deformation.median))),
         soft("τ, %", |s| s.tau_range.map(|_| tau_range(s.tau_range))),
     ];

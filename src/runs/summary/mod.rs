@@ -161,9 +161,10 @@ impl GroupScores {
         self.deformation_ok_rate.is_some()
     }
 
-    /// Safety Success; of rigid targets, which have no limit, no rate.
-    pub fn soft_safety_rate(&self) -> Rate {
-        if self.is_soft() { self.safety_success_rate } else { Rate::default() }
+    /// Rate by which policies are told apart: Safety Success, or Goal Success where that was not judged.
+    pub fn main_rate(&self) -> Rate {
+        let safety = self.safety_success_rate;
+        if safety.rate.is_some() { safety } else { self.goal_success_rate }
     }
 
     pub fn count(&self, category: EpisodeCategory) -> usize {
@@ -295,7 +296,7 @@ fn kappa_curve(records: &[&EpisodeRecord]) -> Vec<RatesAtKappa> {
     if !records.iter().any(|r| r.has_soft_target()) {
         return Vec::new();
     }
-    let is_judged = records.iter().any(|r| r.has_soft_target() && r.is_deformation_judged());
+    let is_judged = records.iter().any(|r| r.has_judged_soft_target());
     let row = |step| {
         let kappa = f64::from(step) / f64::from(KAPPA_STEPS);
         if !is_judged {
