@@ -68,11 +68,6 @@ impl Range {
         Self { usual_min: min, usual_max: max, ..self }
     }
 
-    /// True if some valid values are not usual.
-    pub fn has_usual(&self) -> bool {
-        self.usual_min > f64::NEG_INFINITY || self.usual_max < f64::INFINITY
-    }
-
     /// Describes a value outside of the usual range, and the unit prefix that would bring it inside. `None`
     /// for a usual value.
     pub fn unusual(&self, value: f64, unit: &str) -> Option<String> {
@@ -171,7 +166,6 @@ mod tests {
         assert_eq!(percent, "1 is outside of the usual range 0.002..0.8; ×0.01 would be inside");
         let far = Range::ANY.usually(-3.0, 3.0).unusual(-1e9, "m").expect("far");
         assert_eq!(far, "-1e9 m is outside of the usual range -3..3 m");
-        assert!(youngs.has_usual() && !Range::POSITIVE.has_usual());
     }
 
     #[test]

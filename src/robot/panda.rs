@@ -18,9 +18,6 @@ pub const REACH: f64 = 1.188;
 /// Degrees of freedom of the arm; those of the fingers follow in the tree.
 pub const ARM_DOFS: usize = 7;
 
-/// Degrees of freedom of the tree: seven arm joints and two fingers.
-pub const DOFS: usize = ARM_DOFS + 2;
-
 /// Index of the link that includes the hand.
 pub const HAND_LINK: usize = 6;
 
@@ -286,7 +283,8 @@ mod tests {
     use softvt_physics::joints::{bias, mass_matrix};
 
     /// Start pose of the SoftVTBench release, fingers open.
-    const START: [f64; DOFS] = [-0.01988, -0.18734, 0.00767, -2.40340, 0.00496, 2.24534, 0.79485, 0.04, 0.04];
+    const START: [f64; ARM_DOFS + 2] =
+        [-0.01988, -0.18734, 0.00767, -2.40340, 0.00496, 2.24534, 0.79485, 0.04, 0.04];
 
     fn whole() -> JointTree {
         tree(Pose::identity(), &GripperSpec::default())
@@ -333,7 +331,7 @@ mod tests {
     fn drives_hold_the_arm_and_the_mass_matrix_includes_the_fingers() {
         let tree = whole();
         let poses = forward(&tree, &START);
-        let weight = bias(&tree, &poses, &[0.0; DOFS], &Vec3::new(0.0, 0.0, -9.81));
+        let weight = bias(&tree, &poses, &[0.0; START.len()], &Vec3::new(0.0, 0.0, -9.81));
         for (link, torque) in tree.links.iter().zip(weight.iter()) {
             assert!(torque.abs() < 0.5 * link.effort_limit, "{}: {torque}", link.name);
         }

@@ -6,15 +6,20 @@ use super::*;
 use softvt_common::disk_cache::DiskCache;
 use softvt_geometry::Vec3;
 use softvt_physics::joints::forward;
-use softvt_robot::{GripperSpec, pads, panda};
+use softvt_robot::{
+    GripperSpec, pads,
+    panda::{self, ARM_DOFS},
+};
 
 fn meshes() -> &'static RobotMeshes {
     static MESHES: OnceLock<RobotMeshes> = OnceLock::new();
     MESHES.get_or_init(|| RobotMeshes::new(&DiskCache::DISABLED).expect("every part has a surface"))
 }
 
+/// The arm and two fingers.
+const DOFS: usize = ARM_DOFS + 2;
 /// Joint positions, none of them zero: joints 1 to 7, then the fingers half open.
-const POSE: [f64; panda::DOFS] = [0.3, -0.5, 0.2, -2.0, 0.4, 1.9, 0.7, 0.02, 0.02];
+const POSE: [f64; DOFS] = [0.3, -0.5, 0.2, -2.0, 0.4, 1.9, 0.7, 0.02, 0.02];
 
 #[test]
 fn every_link_is_drawn_once() {
@@ -24,16 +29,16 @@ fn every_link_is_drawn_once() {
         let body = BodyId::Link(LinkId { articulation: ArticulationId::new(3), index: link });
         objects.iter().filter(|object| object.body == body).count()
     };
-    let mut expected = vec![1; panda::DOFS];
+    let mut expected = vec![1; DOFS];
     // The hand moves with the last link, and each finger has a gel.
     expected[panda::HAND_LINK] = 2;
     Side::BOTH.iter().for_each(|&side| expected[panda::finger_link(side)] = 2);
-    assert_eq!((0..panda::DOFS).map(drawn).collect::<Vec<_>>(), expected);
+    assert_eq!((0..DOFS).map(drawn).collect::<Vec<_>>(), expected);
     assert_eq!(objects.iter().filter(|object| object.body == BodyId::World).count(), 1);
 }
 
 /// The solids of each part at joint positions `q`, with their link: 0 for the base, then counted from 1.
-fn posed(q: &[f64; panda::DOFS]) -> Vec<(usize, Vec<RenderSolid>)> {
+fn posed(q: &[f64; DOFS]) -> Vec<(usize, Vec<RenderSolid>)> {
     let poses = forward(&panda::tree(Pose::identity(), &GripperSpec::default()), q);
     let mut parts = vec![arm::base()];
     parts.extend(arm::links());
@@ -47,7 +52,7 @@ fn posed(q: &[f64; panda::DOFS]) -> Vec<(usize, Vec<RenderSolid>)> {
 
 #[test]
 fn links_are_connected_in_any_pose() {
-    for q in [POSE, [0.0; panda::DOFS], POSE.map(|q| -0.5 * q)] {
+    for q in [POSE, [0.0; DOFS], POSE.map(|q| -0.5 * q)] {
         let parts = posed(&q);
         let poses = forward(&panda::tree(Pose::identity(), &GripperSpec::default()), &q);
         for (link, pose) in poses.iter().enumerate().take(panda::ARM_DOFS) {
