@@ -6,6 +6,7 @@ use crate::{
     geometry::{MovingObject, pose_numbers},
     message::Message,
 };
+use softvt_evaluation::{category::CRUSHED_PCT, verdict::TargetVerdict};
 use softvt_geometry::Pose;
 use softvt_media::jpeg::encode_jpeg;
 use softvt_physics::{BodyId, fem::strain::node_strains};
@@ -57,15 +58,16 @@ pub(crate) fn state_message(episode: &mut Episode, moving: &[MovingObject]) -> R
 
 /// Measurements of the judge and the robot.
 fn measured(episode: &Episode) -> Value {
-    let (trace, record) = (episode.trace(), episode.record(None));
-    let verdict = &record.verdict;
+    // A record also has digests of all actions and of the state.
+    let (trace, verdict) = (episode.trace(), episode.verdict());
     let now = episode.targets().iter().zip(&verdict.targets).map(|(&index, target)| {
         let name = &episode.sim.objects[index].name;
         let object = trace.objects.iter().find(|object| object.name == *name);
         (object.and_then(|object| object.d_pct), target.tau)
     });
     let now = StateDeformation::worst(now);
-    let grip = verdict.largest_by(|target| target.grip_ratio);
+    let largest = |of: fn(&TargetVerdict) -> Option<f64>| verdict.largest_by(of).and_then(of);
+    let collapsed_pct = largest(|target| target.collapsed_volume_pct);
     json!({
         "time_s": trace.time_s,
         "d_pct": now.map(|of| of.d_pct),
@@ -75,9 +77,9 @@ fn measured(episode: &Episode) -> Value {
         "slip_mm": verdict.slip_mm,
         "width_mm": 1e3 * trace.gripper_width_m,
         "closure": trace.closure,
-        "grip_ratio": grip.and_then(|target| target.grip_ratio),
-        "collapsed_pct": record.collapsed_volume_pct(),
-        "is_crushed": record.crushed_volume_pct().is_some(),
+        "grip_ratio": largest(|target| target.grip_ratio),
+        "collapsed_pct": collapsed_pct,
+        "is_crushed": collapsed_pct >= Some(CRUSHED_PCT),
         "no_drop": verdict.no_drop,
         "goal_parts": verdict.goal_parts,
     })
