@@ -19,3 +19,19 @@ pub(crate) fn file(path: &str) -> Option<PageFile> {
     };
     Some(PageFile { content, kind })
 }
+
+#[cfg(test)]
+mod tests {
+    use softvt_media::palette::{FAINT, GROUND, INK, OVER_LIMIT, RULE, SAFE};
+
+    #[test]
+    fn the_page_has_no_colours_of_its_own_for_text_ground_and_verdicts() {
+        let page = include_str!("page/style.css");
+        let named = [("ink", INK), ("paper", GROUND), ("line", RULE), ("mute", FAINT)];
+        for (name, colour) in named.into_iter().chain([("safe", SAFE), ("harm", OVER_LIMIT)]) {
+            for of_scheme in [colour.light, colour.dark] {
+                assert!(page.contains(&format!("--{name}: {of_scheme};")), "{name}: {of_scheme}");
+            }
+        }
+    }
+}
