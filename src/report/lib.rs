@@ -11,7 +11,6 @@ pub mod comparison;
 pub mod comparison_table;
 pub mod condition_effects;
 pub mod condition_table;
-mod d_axis;
 pub mod episode_page;
 pub mod leaderboard;
 pub mod mcap;

@@ -4,6 +4,7 @@ use serde_json::{Value, json};
 
 use crate::message::Message;
 use softvt_geometry::Pose;
+use softvt_media::d_axis::{D_ENDS, D_TICKS};
 use softvt_physics::BodyId;
 use softvt_rollout::{Episode, ObjectInstance, SensingError};
 use softvt_scene::{Body, Camera, CameraMount, ROBOT_SEGMENTATION_ID};
@@ -54,6 +55,7 @@ pub(crate) fn scene_message(
     }
     let mut content = about;
     content["type"] = json!("scene");
+    content["d_axis"] = json!({ "ends": D_ENDS, "ticks": D_TICKS });
     content["objects"] = json!(objects);
     content["bodies"] = json!(soft);
     content["cameras"] = json!(cameras);

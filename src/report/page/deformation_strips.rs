@@ -3,12 +3,10 @@
 use maud::{Markup, html};
 
 use super::marks::{legend, mark, vertical_lines, x, y};
-use crate::{
-    d_axis::{D_TICKS, d_share},
-    run_summary::RunSummary,
-};
+use crate::run_summary::RunSummary;
 use softvt_common::text::decimal;
 use softvt_evaluation::{category::EpisodeCategory, statistics::Distribution};
+use softvt_media::d_axis::{D_TICKS, d_share};
 
 /// Height of a strip, pixels.
 const HEIGHT: f64 = 34.0;

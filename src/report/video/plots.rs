@@ -2,13 +2,13 @@
 //! episode.
 
 use super::{COLOURS, pad_force, worst_state};
-use crate::d_axis::d_axis;
 use softvt_benchmark::CONTROL_DT;
 use softvt_common::text::shortened;
 use softvt_media::{
     axis::{Axis, tick_step},
     canvas::{Canvas, Rgb8},
     chart::{Chart, ChartPoint, Curve, Frame, Mark},
+    d_axis::d_axis,
     drawing::{Anchor, Area, Element, Font, Stroke, Tone, at, line, styled_text},
 };
 use softvt_rollout::StateRecording;

@@ -2,8 +2,6 @@
 
 // Margin for the axis labels, px.
 const LEFT = 28, BOTTOM = 14;
-// Ends and labels of the logarithmic axis of D/τ, the same as in videos and reports.
-const D_ENDS = [0.05, 50], D_TICKS = [0.1, 0.3, 1, 3, 10, 30];
 
 export class Plot {
   // `options`: values (of a state, one per line), most (upper end of the axis at least), limit (a line to stay below),
@@ -18,8 +16,9 @@ export class Plot {
     });
   }
 
-  // Draws the states up to now, with a mark at `cursor`. `span` is the number of control steps of the axis.
-  draw(states, cursor, span, hz) {
+  // Draws the states up to now, with a mark at `cursor`. `span` is the number of control steps of the axis,
+  // `d_axis` has the ends and ticks of that of D/τ.
+  draw(states, cursor, span, hz, d_axis) {
     const { canvas, options } = this;
     this.span = span;
     const ratio = devicePixelRatio, width = canvas.clientWidth, height = canvas.clientHeight;
@@ -36,8 +35,9 @@ export class Plot {
     g.setTransform(ratio, 0, 0, ratio, 0, 0);
     g.clearRect(0, 0, width, height);
     const x = (step) => LEFT + (step / span) * (width - LEFT - 2);
+    const [from, to] = d_axis.ends;
     const share = (value) => options.is_d
-      ? Math.log(Math.max(value, D_ENDS[0]) / D_ENDS[0]) / Math.log(D_ENDS[1] / D_ENDS[0])
+      ? Math.log(Math.max(value, from) / from) / Math.log(to / from)
       : value / most;
     const y = (value) => height - BOTTOM - Math.min(share(value), 1) * (height - BOTTOM - 6);
     g.font = "11px system-ui, sans-serif";
@@ -45,7 +45,7 @@ export class Plot {
     g.fillStyle = mute;
     g.strokeRect(LEFT, 6, width - LEFT - 2, height - BOTTOM - 6);
     if (options.is_d) {
-      for (const tick of D_TICKS.filter((tick) => tick !== options.limit)) g.fillText(String(tick), 2, y(tick) + 4);
+      for (const tick of d_axis.ticks.filter((tick) => tick !== options.limit)) g.fillText(String(tick), 2, y(tick) + 4);
     } else {
       g.fillText("0", LEFT - 12, height - BOTTOM);
       g.fillText(String(Number(most.toPrecision(2))), 2, 14);

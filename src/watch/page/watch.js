@@ -113,9 +113,9 @@ function update() {
   view.show(state);
   showBadge(measured);
   showParts(measured.goal_parts);
-  const hz = player.scene.control_hz, span = Math.max(player.states.length - 1, 10 * hz);
+  const { control_hz: hz, d_axis } = player.scene, span = Math.max(player.states.length - 1, 10 * hz);
   const until = player.states.slice(0, Math.floor(player.cursor) + 1);
-  plots.forEach((plot) => plot.draw(until, Math.floor(player.cursor), span, hz));
+  plots.forEach((plot) => plot.draw(until, Math.floor(player.cursor), span, hz, d_axis));
   $("d-value").textContent = fixed(relative(measured)[0], 2);
   $("force-value").textContent = measured.pad_force_n.map((force) => force.toFixed(2)).join(" and ");
   $("width-value").textContent = measured.width_mm.toFixed(2);

@@ -1,20 +1,23 @@
-//! The logarithmic axis of D/τ, the same for all figures and for videos of several policies.
+//! The logarithmic axis of D/τ, the same for all figures, for videos of several policies and for the page of
+//! `softvt watch`.
 
-use softvt_media::{
+use crate::{
     axis::{Axis, Scale, Tick},
     drawing::Tone,
 };
 
-const SCALE: Scale = Scale::Logarithmic { from: 0.05, to: 50.0 };
-pub(crate) const D_TICKS: [f64; 6] = [0.1, 0.3, 1.0, 3.0, 10.0, 30.0];
+/// D/τ at both ends.
+pub const D_ENDS: [f64; 2] = [0.05, 50.0];
+const SCALE: Scale = Scale::Logarithmic { from: D_ENDS[0], to: D_ENDS[1] };
+pub const D_TICKS: [f64; 6] = [0.1, 0.3, 1.0, 3.0, 10.0, 30.0];
 
 /// Place of D/τ on the axis, 0 to 1 within its ends.
-pub(crate) fn d_share(d_over_tau: f64) -> f64 {
+pub fn d_share(d_over_tau: f64) -> f64 {
     SCALE.share(d_over_tau)
 }
 
 /// The axis for a chart in a video.
-pub(crate) fn d_axis() -> Axis {
+pub fn d_axis() -> Axis {
     let tick = |value: f64| match value {
         1.0 => Tick { value, label: "τ".to_owned(), tone: Tone::Harm },
         _ => Tick { value, label: value.to_string(), tone: Tone::Faint },
