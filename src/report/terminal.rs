@@ -28,7 +28,7 @@ const WIDE_WIDTH: usize = 30;
 /// Columns of the bar of a rate.
 const BAR_WIDTH: usize = 12;
 /// Number of episodes below which intervals are called wide.
-const FEW_EPISODES: usize = 30;
+pub(crate) const FEW_EPISODES: usize = 30;
 /// Largest number of invalid episodes listed.
 const MAX_INVALID_LISTED: usize = 5;
 /// Largest number of aborted episodes listed.

@@ -2,13 +2,10 @@
 
 use maud::{Markup, html};
 
-use crate::{condition_effects::ConditionEffects, run_summary::RunSummary};
+use crate::{condition_effects::ConditionEffects, run_summary::RunSummary, terminal::FEW_EPISODES};
 use softvt_common::text::{counted, decimal};
 use softvt_evaluation::category::EpisodeCategory;
 use softvt_runs::record::EpisodeRecord;
-
-/// Number of episodes below which intervals are called wide.
-const FEW_EPISODES: usize = 30;
 
 /// One paragraph per suite, of the runs without a changed condition, and one per set of conditions.
 pub(super) fn result_sentences(runs: &[RunSummary], effects: &[ConditionEffects]) -> Markup {
