@@ -69,7 +69,7 @@ pub fn column_statistics(paths: &[impl AsRef<Path>]) -> Result<Vec<ColumnStatist
             }
             peaks.extend(file.record(demo).ok().and_then(|record| record.d_peak()));
             // Missing for rigid targets and without privileged streams.
-            if let Ok(d) = file.array(demo, "privileged/d") {
+            if let Ok(d) = file.array(demo, streams::DEFORMATION) {
                 soft.extend(d.values);
             }
         }

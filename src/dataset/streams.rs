@@ -89,6 +89,8 @@ pub(crate) const JOINT_ACTIONS: &str = "actions_joints";
 pub(crate) const COMMANDED_ROTATIONS: &str = "commanded_rotations";
 /// Name of the stream that marks actions that commanded joint positions; present if there are any.
 pub(crate) const COMMANDS_JOINTS: &str = "commands_joints";
+/// Name of the stream of D, %.
+pub(crate) const DEFORMATION: &str = "privileged/d";
 pub(crate) const MARKER_MOTION: &str = "obs/gripper_marker_motion";
 /// Shape of its rows: finger, initial and present, marker, (x, y).
 pub(crate) const MARKER_ROW: [usize; 4] = [2, 2, MARKER_COUNT, 2];
@@ -410,7 +412,7 @@ fn privileged() -> Vec<StreamSpec> {
         sometimes("privileged/dropped", &[], |rollout| rollout.traced(|trace| vec![one(trace.dropped)]))
             .number_type(NumberType::U8)
             .about("1 once dropped"),
-        deformation("privileged/d", METRIC_ID, |rollout| {
+        deformation(DEFORMATION, METRIC_ID, |rollout| {
             rollout.scored(|score| Some(score.targets[0].deformation?.rms_pct))
         })
         .about("D, % of the diagonal; the worst of the previous control step"),

@@ -28,6 +28,6 @@ pub use observation::{
 };
 pub use robot_state::{
     ExportedStream, JOINT_NAMES, MAX_ANGLE, MAX_POSITION_M, NumberType, ROBOT_STREAMS, RecordedStream,
-    RobotState, RobotStream, StatePart, pose_row,
+    RobotState, RobotStream, StatePart, pose_row, stream_paths,
 };
 pub use softvt_robot::GripTarget;

@@ -182,6 +182,15 @@ impl RecordedStream {
     }
 }
 
+/// Paths of recorded streams that imports and exports read.
+pub mod stream_paths {
+    pub const POSES: &str = "obs/eef_pose";
+    pub const STATES: &str = "obs/state";
+    pub const JOINTS: &str = "obs/arm_joint_pos";
+    pub const FINGERS: &str = "obs/gripper_pos";
+    pub const SENSED_WIDTHS: &str = "obs/gripper_width_sensed";
+}
+
 const BASE: &str = "robot base";
 
 /// All quantities. Those that are recorded are in the order of the HDF5 files.
@@ -217,7 +226,7 @@ pub static ROBOT_STREAMS: &[RobotStream] = {
         .recorded(Dataset {
             frame: BASE,
             meaning: "tool position, quaternion w x y z with w >= 0",
-            ..Dataset::new("obs/eef_pose")
+            ..Dataset::new(stream_paths::POSES)
         }),
         Stream::new(
             7,
@@ -232,12 +241,12 @@ pub static ROBOT_STREAMS: &[RobotStream] = {
         .recorded(Dataset {
             frame: BASE,
             meaning: "tool position, axis-angle, position of one finger (0 shut to 0.04)",
-            ..Dataset::new("obs/state")
+            ..Dataset::new(stream_paths::STATES)
         }),
         Stream::new(ARM_DOFS, "rad", MAX_ANGLE, "The seven joint angles of the arm, rad.", |robot| robot.joints.to_vec())
             .part("joints")
             .field("joints")
-            .recorded(Dataset::new("obs/arm_joint_pos")),
+            .recorded(Dataset::new(stream_paths::JOINTS)),
         Stream::new(ARM_DOFS, "rad/s", MAX_JOINT_RATE, "Velocities of the arm's joints, rad/s.", |robot| {
             robot.joint_velocities.to_vec()
         })
@@ -264,7 +273,7 @@ pub static ROBOT_STREAMS: &[RobotStream] = {
             about: "torques of the arm's drives (N m), without gravity",
         }),
         Stream::new(2, "m", ABOUT_ONE, "Exact positions of the fingers, m.", |robot| robot.fingers_m.to_vec())
-            .recorded(Dataset::new("obs/gripper_pos")),
+            .recorded(Dataset::new(stream_paths::FINGERS)),
         Stream::new(1, "m", ABOUT_ONE, "Exact distance between the gels, 0 to 0.08 m.", |robot| vec![robot.gripper_width_m])
             .part("gripper_width")
             .drive()
@@ -284,7 +293,7 @@ pub static ROBOT_STREAMS: &[RobotStream] = {
         .part("sensed_width")
         .recorded(Dataset {
             meaning: "the width with the steps and the offset of a real hand",
-            ..Dataset::new("obs/gripper_width_sensed")
+            ..Dataset::new(stream_paths::SENSED_WIDTHS)
         }),
         Stream::new(1, "m", ABOUT_ONE, "Half of the sensed width, m.", |robot| vec![0.5 * robot.sensed_width_m])
             .part("sensed_finger_position"),

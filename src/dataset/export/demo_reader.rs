@@ -15,7 +15,11 @@ use crate::{
     streams::{IMAGES, JOINT_ACTIONS, MARKER_MOTION, MARKER_ROW, actions_in},
 };
 use softvt_common::text::hex;
-use softvt_policy::{ROBOT_STREAMS, RobotStream, profile::GripCode};
+use softvt_policy::{
+    ROBOT_STREAMS, RobotStream,
+    profile::GripCode,
+    stream_paths::{JOINTS, SENSED_WIDTHS, STATES},
+};
 use softvt_robot::{panda::ARM_DOFS, tactile::IMAGE_SIZE};
 use softvt_sensing::tactile::{HISTORY_LENGTH, MARKER_COUNT, TactileMosaicLayout, mosaic, mosaic_cell};
 
@@ -23,8 +27,6 @@ use softvt_sensing::tactile::{HISTORY_LENGTH, MARKER_COUNT, TactileMosaicLayout,
 const IMAGES_PER_BLOCK: usize = 32;
 /// Numbers of a row of `actions` and of `obs/state`: a pose, and one of the gripper.
 const ACTION_ROW: usize = 7;
-/// Stream of the measured joint positions, rad.
-const JOINTS: &str = "obs/arm_joint_pos";
 /// Numbers of the markers in one state of one finger.
 const FINGER_COORDINATES: usize = 2 * MARKER_COUNT;
 
@@ -117,10 +119,10 @@ impl DemoReader {
     /// States, row by row: of the arm, and the sensed position of one finger.
     fn states(&self, control: ArmControl) -> Result<Vec<f32>, DatasetError> {
         let arm = match control {
-            ArmControl::Pose => without_last(&self.floats("obs/state", &[ACTION_ROW])?),
+            ArmControl::Pose => without_last(&self.floats(STATES, &[ACTION_ROW])?),
             ArmControl::Joints => self.floats(JOINTS, &[ARM_DOFS])?,
         };
-        let widths = self.floats("obs/gripper_width_sensed", &[1])?;
+        let widths = self.floats(SENSED_WIDTHS, &[1])?;
         Ok(with_last(control, &arm, widths.into_iter().map(|width| 0.5 * width)))
     }
 

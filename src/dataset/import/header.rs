@@ -7,6 +7,7 @@ use super::{
     foreign::{ForeignFormat, ForeignTask},
 };
 use softvt_benchmark::CONTROL_HZ;
+use softvt_policy::stream_paths::POSES;
 
 pub(super) struct Header {
     pub format: ForeignFormat,
@@ -131,7 +132,7 @@ fn format_of(file: &TaskFile, environment: &Value) -> Result<ForeignFormat, Data
     let shape = file.shape(first, "actions")?;
     let is_robosuite = || environment["type"] == 1 || ROBOSUITE.iter().any(|name| file.has(first, name));
     match shape[..] {
-        [_, 7 | 13] if file.has(first, "obs/eef_pose") => Ok(ForeignFormat::SoftVtBench),
+        [_, 7 | 13] if file.has(first, POSES) => Ok(ForeignFormat::SoftVtBench),
         [_, 7] if is_robosuite() => Ok(ForeignFormat::Libero),
         _ => {
             let what = format!(

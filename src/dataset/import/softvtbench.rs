@@ -14,11 +14,10 @@ use softvt_geometry::{Pose, Quat, Vec3};
 use softvt_policy::{
     Action, ToolCommand,
     profile::{GripCode, GripperValues},
+    stream_paths::{FINGERS, JOINTS, POSES},
 };
 use softvt_robot::rotation;
 
-const POSES: &str = "obs/eef_pose";
-const JOINTS: &str = "obs/arm_joint_pos";
 /// Largest distance of the recorded tool point from ours, m: its frame may be slightly farther out.
 const MAX_TOOL_OFFSET: f64 = 0.03;
 /// Largest mean distance of actions from the recorded poses, m and rad.
@@ -187,7 +186,7 @@ fn gripper_encoding(
 
 /// True if the finger positions in the actions are the measured ones.
 fn fingers_are_measured(reader: DemoReader, actions: &[SoftvtbenchAction]) -> Result<bool, DatasetError> {
-    let fingers = reader.rows_if_present::<2>("obs/gripper_pos", actions.len())?;
+    let fingers = reader.rows_if_present::<2>(FINGERS, actions.len())?;
     let is_measured =
         |action: &SoftvtbenchAction, finger: f64| (action.gripper - finger).abs() < MEASURED_TOLERANCE;
     Ok(fingers
