@@ -1,8 +1,9 @@
 //! The measures of episodes, each declared once: what it is of a record, how a summary aggregates it, how two runs are
 //! compared by it, and how tables show it.
 //!
-//! `measures!` makes [`GroupScores`], [`EpisodeDeformation`] and [`PairedComparison`] of the list, and [`MEASURES`],
-//! from which tables and the reference in `docs/results.md` are made. A row is
+//! `measures!` makes [`GroupScores`], [`EpisodeDeformation`] and [`PairedComparison`] of the list, and [`MEASURES`]. Of
+//! these, comparisons, the tables of the grip, volumes, harm and the course of D, and that of `docs/results.md` are
+//! made. Tables that select and arrange a few measures read their fields. A row is
 //!
 //! ```text
 //! Kind(value of a record) in key-of-summaries vs key-of-comparisons, group, "heading", decimals, "unit", "meaning";
@@ -37,7 +38,7 @@ pub enum MeasureGroup {
     Volume,
     /// Other objects than the targets.
     Harm,
-    /// Scores of other benchmarks.
+    /// Scores of other benchmarks, in `summary.json` alone.
     OtherRule,
 }
 
