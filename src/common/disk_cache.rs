@@ -8,8 +8,8 @@
 //! When all are too large, entries that were never read are removed before those that were, as in a segmented LRU cache
 //! (Karedla, Love and Wherry, 1994): a run with hundreds of instances writes many values that no other run needs.
 //!
-//! The cache crates keep values by a key in one file or database, which one damaged page or one process with a lock
-//! makes unusable for all.
+//! Of the cache crates, databases are damaged or locked as a whole, and `cacache`, with a file per value, has no limit
+//! of its size.
 
 use std::{
     fs::{self, File, OpenOptions},

@@ -1,7 +1,8 @@
 //! A cache whose values are computed once and shared by all threads.
 //!
-//! Written here because the keys hold floating-point numbers: they can be compared but not hashed, which the cache
-//! crates require. The number of entries is small, so that a linear search is fast.
+//! Written here because the keys hold floating-point numbers and so have no `Hash`, which the cache crates require; the
+//! hash of all their bytes that names an entry on disk would be computed at every use. The number of entries is small,
+//! so that a linear search is fast.
 
 use std::sync::{Arc, Mutex};
 

@@ -1,8 +1,7 @@
 //! The MP4 container (ISO/IEC 14496-12, 14496-15): one H.264 track, with the index before the frames so that browsers
 //! can start playback at once.
 //!
-//! Written by hand: the crate `mp4` writes the index after the frames and no colour information (`colr`), and any
-//! other writer would change the bytes of recorded videos.
+//! Written by hand: the crate `mp4` writes the index after the frames and no colour information (`colr`).
 
 /// Clock ticks per frame.
 const TICKS: u32 = 1000;
