@@ -666,7 +666,7 @@
 ---@class softvt.GraspOptions
 ---@field rate? number Rate of the gripper: 1 is the whole stroke in a second, 5 the speed of the fingers. Expects a number (1/s) in 0.001..5. Default 0.5.
 ---@field width? number Measured distance of the gels at which closing stops. A tactile servo ignores it. Expects metres in 0..0.08.
----@field force? number Mean normal force per pad at which closing stops. A tactile servo ignores it. Expects a number (N) in above 0..140.
+---@field force? number Mean normal force per pad at which closing stops. A tactile servo ignores it. Expects a number (N) above 0.
 
 ---Options of releasing an object.
 ---@class softvt.ReleaseOptions
@@ -1526,6 +1526,7 @@ function Instances:sample(object, count) end
 ---@field width number Measured distance of the gels, m.
 ---@field stroke number Largest distance of the gels, m.
 ---@field finger_stiffness number Stiffness of the drive of a finger, N/m (robot.gripper.kp).
+---@field finger_effort number Largest force of the drive of a finger, N (robot.gripper.effort).
 ---@field force number[] Sum of the normal forces at all contact points of the left and the right gel pad, N, whatever touches it; forces on the cases of the fingers do not count. On the edge of a pad the normals are oblique, and the sum is larger than the pressing force, which is -sim:tactile(side).force[3].
 ---@field grip_controller string? Name of the controller that takes the place of the expert's own grip, such as "size-seen" under --policy size-seen (experts.blind_grips). nil under policies that have none.
 ---@field instances softvt.Instances? With a grip_controller, which must not know the instance: the instances that the suite can draw. nil without.
@@ -1939,6 +1940,10 @@ function softvt.stable(row) end
 ---@param width_mm number
 ---@return number?
 function softvt.force_at(sweep, width_mm) end
+
+---Returns measures of the standard hand: stroke is the largest distance of the gels, m; case_across is half of the thickness of a finger's sensor case across the finger, m; case_below is its extent below the tool centre point, m; finger_stiffness is that of the drive of a finger, N/m, which for the robot of a run is arm.finger_stiffness.
+---@return table<string, number>
+function softvt.hand() end
 
 ---Returns the instances that a suite can draw, by its own variation.
 ---@param suite softvt.Suite

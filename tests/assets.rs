@@ -16,7 +16,6 @@ use softvt::{
         samples::{SampleSpec, surface_samples},
         voxel::{VoxelSpec, voxel_mesh},
     },
-    robot::{RobotSpec, gripper},
     rollout::{AssetCache, Sensors, Simulation},
     scene::{Asset, Body, EXPERT_HINTS, Mask, Scene},
     script::{self, EpisodeSetup, LoadedScript, SceneChanges},
@@ -239,18 +238,6 @@ fn stacks(stacks: &[&[&str]]) -> Vec<Scene> {
     std::fs::write(&path, text).expect("is written");
     let loaded = script::load(&path, &[]).unwrap_or_else(|e| panic!("{e}"));
     (0..stacks.len()).map(|task| scene(&loaded, task, 0)).collect()
-}
-
-#[test]
-fn the_standard_hand_of_the_experts_is_that_of_the_robot() {
-    let hand = include_str!("../scripts/experts/hand.lua");
-    let (stroke, force, stiffness) =
-        (gripper::MAX_WIDTH, gripper::MAX_FORCE, RobotSpec::default().gripper.kp);
-    for number in
-        [format!("STROKE = {stroke},"), format!("FORCE = {force},"), format!("STIFFNESS = {stiffness} }}")]
-    {
-        assert!(hand.contains(&number), "{number} in {hand}");
-    }
 }
 
 #[test]

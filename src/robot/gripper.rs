@@ -9,9 +9,6 @@ use super::spec::GripperSpec;
 /// Largest width between the gel apexes, m.
 pub const MAX_WIDTH: f64 = 0.08;
 
-/// Largest force on each pad, N (Franka Hand, product manual: maximum grasping force).
-pub const MAX_FORCE: f64 = 140.0;
-
 /// Target width (m) of a closure in 0..=1.
 pub fn target_width(closure: f64) -> f64 {
     MAX_WIDTH * (1.0 - closure)

@@ -19,7 +19,7 @@ use softvt_physics::contact::{CollisionGeometry, ContactSurface, GelSample};
 pub(super) const APEX_Z: f64 = 0.045;
 
 /// Half extents of the sensor's case, finger axes, m: 28 mm across, 24 mm deep, 32 mm along the finger.
-const CASE_HALF: Vec3 = Vec3::new(0.014, 0.012, 0.016);
+pub const CASE_HALF: Vec3 = Vec3::new(0.014, 0.012, 0.016);
 
 /// Geometry of a gel pad: a paraboloid dome z = h(x, y) over a rounded rectangle, in the pad frame.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -155,11 +155,6 @@ impl RobotInstance {
         articulation.drives_mut().iter_mut().flatten().zip(targets).for_each(|(drive, q)| drive.target = q);
     }
 
-    /// Stiffness of the drive of a finger, N/m.
-    pub fn finger_stiffness(&self) -> f64 {
-        self.spec.gripper.kp
-    }
-
     /// Arm joint angles, rad.
     pub fn q(&self, world: &World) -> [f64; ARM_DOFS] {
         std::array::from_fn(|i| world.articulation(self.articulation).state.q[i])

@@ -28,10 +28,7 @@ use crate::{
 };
 use softvt_common::{parallel::lock, text::unknown_name};
 use softvt_geometry::Pose;
-use softvt_robot::{
-    Obstacle, clearance,
-    gripper::{MAX_FORCE, MAX_WIDTH},
-};
+use softvt_robot::{GripperSpec, Obstacle, clearance, gripper::MAX_WIDTH, pads::CASE_HALF};
 use softvt_scene::{Asset, Body, Object};
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -219,7 +216,7 @@ impl Coroutine {
 
 /// Makes the arm, whose methods are in the embedded library.
 fn arm(lua: &Lua, host: &mlua::AnyUserData, fingers: Table, notes: &SharedNotes) -> mlua::Result<Table> {
-    let servo: Table = library_chunk(lua, "servo")?.call(())?;
+    let servo: Table = library_chunk(lua, "servo")?.call(MAX_WIDTH)?;
     let notes = notes.clone();
     let note = lua.create_function(move |lua, (name, value)| {
         let mut notes = lock(&notes);
@@ -288,7 +285,7 @@ const MAX_ANGULAR_SPEED: f64 = 10.0;
 
 #[expect(dead_code, reason = "the arm's Lua code reads the fields")]
 mod options {
-    use super::{CLOSURE, MAX_ANGULAR_SPEED, MAX_FORCE, MAX_SPEED, MAX_WIDTH, RATE};
+    use super::{CLOSURE, MAX_ANGULAR_SPEED, MAX_SPEED, MAX_WIDTH, RATE};
     use crate::schema::{Range, Type, record};
 
     record! {
@@ -313,7 +310,7 @@ mod options {
             /// Measured distance of the gels at which closing stops. A tactile servo ignores it.
             width: Option<f64> = Type::Number("m", Range::closed(0.0, MAX_WIDTH));
             /// Mean normal force per pad at which closing stops. A tactile servo ignores it.
-            force: Option<f64> = Type::Number("N", Range::above(0.0, MAX_FORCE));
+            force: Option<f64> = Type::Number("N", Range::POSITIVE);
         }
         /// Options of releasing an object.
         ReleaseOptions: "softvt.ReleaseOptions" as "arm:release" {
@@ -360,7 +357,9 @@ class! {
             /// Largest distance of the gels, m.
             stroke: "number" { get(_, _) { MAX_WIDTH } }
             /// Stiffness of the drive of a finger, N/m (robot.gripper.kp).
-            finger_stiffness: "number" { get(_, this) { this.read(|view| view.finger_stiffness) } }
+            finger_stiffness: "number" { get(_, this) { this.read(|view| view.gripper.kp) } }
+            /// Largest force of the drive of a finger, N (robot.gripper.effort).
+            finger_effort: "number" { get(_, this) { this.read(|view| view.gripper.effort) } }
             /// Sum of the normal forces at all contact points of the left and the right gel pad, N, whatever touches
             /// it; forces on the cases of the fingers do not count. On the edge of a pad the normals are oblique, and
             /// the sum is larger than the pressing force, which is -sim:tactile(side).force[3].
@@ -484,6 +483,18 @@ class! {
 
 functions! {
     FUNCTIONS {
+        /// Returns measures of the standard hand: stroke is the largest distance of the gels, m; case_across is half of
+        /// the thickness of a finger's sensor case across the finger, m; case_below is its extent below the tool
+        /// centre point, m; finger_stiffness is that of the drive of a finger, N/m, which for the robot of a run is
+        /// arm.finger_stiffness.
+        fn hand(lua) -> ["table<string, number>"] {
+            lua.create_table_from([
+                ("stroke", MAX_WIDTH),
+                ("case_across", CASE_HALF.x),
+                ("case_below", CASE_HALF.z),
+                ("finger_stiffness", GripperSpec::default().kp),
+            ])?
+        }
         /// Returns the instances that a suite can draw, by its own variation.
         fn instances(lua, suite: Constructed<SuiteSpec>) -> ["softvt.Instances"] {
             check_privilege(lua, "softvt.instances")?;

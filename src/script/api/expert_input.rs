@@ -19,7 +19,7 @@ use softvt_common::episode_id::{EpisodeId, EpisodeSplit};
 use softvt_common::parallel::lock;
 use softvt_geometry::{Aabb, Pose, Vec3};
 use softvt_robot::{
-    DiffIk, IkSpec,
+    DiffIk, GripperSpec, IkSpec,
     ik::{ArmAngles, PoseDifference, PoseTolerance, UnreachablePose},
 };
 use softvt_rollout::{ObjectInstance, Simulation};
@@ -70,8 +70,8 @@ pub(crate) struct ExpertView {
     pub tcp_b: Pose,
     /// Distance of the gels, m.
     pub width_m: f64,
-    /// Stiffness of the drive of a finger, N/m.
-    pub finger_stiffness: f64,
+    /// Drives of the fingers.
+    pub gripper: GripperSpec,
     /// Last commanded closure: 0 is open, 1 is closed.
     pub closure: f64,
     /// Normal force on the left and the right pad, N.
@@ -190,7 +190,7 @@ pub(crate) fn expert_view(sim: &Simulation, time_s: f64) -> ExpertView {
         reach: ArmReach { ik: sim.robot.spec.ik.clone(), joints: sim.robot.q(&sim.world) },
         tcp_b: sim.robot.tool_b(&sim.world),
         width_m: sim.robot.width(&sim.world),
-        finger_stiffness: sim.robot.finger_stiffness(),
+        gripper: sim.robot.spec.gripper.clone(),
         closure: sim.robot.closure(),
         pad_force_n: sim.pad_normal_forces(),
         grip_controller: None,

@@ -7,7 +7,7 @@ use crate::{
 };
 use softvt_benchmark::{Goal, Plan, ShiftValue};
 use softvt_geometry::{Pose, Vec3, shape::Shape};
-use softvt_robot::IkSpec;
+use softvt_robot::{GripperSpec, IkSpec};
 use softvt_rollout::Controller;
 use softvt_scene::{Asset, Body};
 
@@ -46,7 +46,7 @@ fn view() -> ExpertView {
         base_w: Pose::translation(-0.66, 0.0, 0.012),
         tcp_b: Pose::translation(0.66, 0.0, 0.288),
         width_m: 0.08,
-        finger_stiffness: 2000.0,
+        gripper: GripperSpec::default(),
         closure: 0.0,
         pad_force_n: [0.0; 2],
         grip_controller: None,
