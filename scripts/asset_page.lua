@@ -87,7 +87,7 @@ local function kind(asset) return tostring(asset.body) end
 local function graspable(asset)
   local hints, size = asset.hints or {}, views.size(asset)
   if kind(asset) == "softvt.articulated" then return false end
-  return hints.grasp_rim_m ~= nil or (hints.grasp_width_m or math.min(size[1], size[2])) < 0.08
+  return hints.grasp_rim_m ~= nil or (hints.grasp_width_m or math.min(size[1], size[2])) < softvt.hand().stroke
 end
 
 -- An image of a fixed width: tables of Markdown shrink theirs until no word breaks.

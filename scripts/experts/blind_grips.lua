@@ -6,14 +6,14 @@
 -- look-retry and weigh keep no number constant: they lift, look whether the object follows or weigh what hangs on the
 -- arm, and close further.
 local grasp = require "experts.grasp"
-local hand = require "experts.hand"
 local trial_constants = require "experts.trial_constants"
 
 local blind_grips = {}
 
 -- Instances of a kind that a number is optimised over.
 local INSTANCES = 600
-local STROKE = hand.STROKE
+local hand = softvt.hand()
+local STROKE = hand.stroke
 -- Largest speed of closing in contact, m/s, share of an error that is corrected per control step, largest duration, s,
 -- and tolerance, m. The measured width lags by two steps behind its command; a larger share would overshoot.
 local SPEED, SHARE, DURATION, TOLERANCE = 0.004, 0.15, 4, 1e-5
@@ -62,7 +62,7 @@ local function depth(grip, window) return window.contact - grip.width end
 
 -- Depth of its command below first contact, m: what the spring of the drives adds to the indentation is that of the
 -- force.
-local function command_depth(grip, window) return window.contact - grasp.command_width(grip) end
+local function command_depth(grip, window, stiffness) return window.contact - grasp.command_width(grip, stiffness) end
 
 local function force_of(grip) return grip.force end
 
@@ -111,8 +111,8 @@ local function drive_numbers()
   for _, power in ipairs { 0, 0.5, 1, 2, 4 } do
     list[#list + 1] = {
       power = power,
-      of = function(grip, window)
-        local beyond = depth(grip, window) - depth_at(window, CONTACT_GAP * hand.STIFFNESS / 2)
+      of = function(grip, window, stiffness)
+        local beyond = depth(grip, window) - depth_at(window, CONTACT_GAP * (stiffness or hand.finger_stiffness) / 2)
         return grip.force * math.max(0, 1e3 * beyond) ^ power
       end,
     }
@@ -136,12 +136,12 @@ local function close_by_drives(arm, number, power)
   end
 end
 
--- By controller: the numbers that it may keep constant, as functions of a grip { width, force } and the window of its
--- instance, which rise as the hand closes; the powers of the size; and the motion of the hand, given the number and the
--- width of first contact, m.
+-- By controller: the numbers that it may keep constant, as functions of a grip { width, force }, the window of its
+-- instance and the stiffness of the drives (N/m, default that of the standard hand), which rise as the hand closes; the
+-- powers of the size; and the motion of the hand, given the number and the width of first contact, m.
 local LAWS = {
   ["fixed-closure"] = {
-    numbers = { { of = function(grip) return grasp.command(grip) end } },
+    numbers = { { of = function(grip, _, stiffness) return grasp.command(grip, stiffness) end } },
     size_powers = { 0 },
     close = function(arm, number) arm:grasp(clamp(number), { rate = RATE }) end,
   },
@@ -182,11 +182,11 @@ blind_grips.names = { "fixed-closure", "size-seen", "contact-depth", "one-force"
 
 -- Instances with a window, as { instance, window } each, of the sample of an object in the scene or of a kind. Also
 -- returns the share of the draws that the suite keeps.
-local function with_windows(instances, name, count)
-  local list, draws = {}, 0
+local function with_windows(instances, name, count, stiffness)
+  local list, draws = { stiffness = stiffness }, 0
   for _, other in ipairs(instances:sample(name, count)) do
     local window = grasp.window(other)
-    if window and grasp.command(window.loose) <= grasp.command(window.tight) then
+    if window and grasp.command(window.loose, stiffness) <= grasp.command(window.tight, stiffness) then
       list[#list + 1] = { instance = other, window = window }
     end
     draws = draws + other.draws
@@ -196,11 +196,11 @@ end
 
 -- The sample that the number of a controller is optimised over: instances of the kind of an object in the scene, or of
 -- all kinds.
-function blind_grips.sample(name, instances, object, count)
-  if not LAWS[name].all_kinds then return with_windows(instances, object, count or INSTANCES) end
-  local list = {}
+function blind_grips.sample(name, instances, object, count, stiffness)
+  if not LAWS[name].all_kinds then return with_windows(instances, object, count or INSTANCES, stiffness) end
+  local list = { stiffness = stiffness }
   for _, kind in ipairs(instances:kinds()) do
-    local own = with_windows(instances, kind, count or INSTANCES)
+    local own = with_windows(instances, kind, count or INSTANCES, stiffness)
     table.move(own, 1, #own, #list + 1, list)
   end
   return list
@@ -211,19 +211,20 @@ end
 function blind_grips.best(name, sample)
   local law, best = LAWS[name], nil
   for _, number in ipairs(law.numbers) do
+    local function of(grip, window) return number.of(grip, window, sample.stiffness) end
     for _, size_power in ipairs(law.size_powers) do
       local lows, highs = {}, {}
       for index, one in ipairs(sample) do
         local factor = one.instance.scale ^ size_power
-        lows[index] = number.of(one.window.loose, one.window) / factor
-        highs[index] = math.max(lows[index], number.of(one.window.tight, one.window) / factor)
+        lows[index] = of(one.window.loose, one.window) / factor
+        highs[index] = math.max(lows[index], of(one.window.tight, one.window) / factor)
       end
       local value, count = most_common(lows, highs)
       if value and (not best or count > best.count) then
         best = {
           value = value,
           size_power = size_power,
-          of = number.of,
+          of = of,
           power = number.power,
           count = count,
           share = count / #sample,
@@ -303,16 +304,17 @@ local TRIALS = {
 
 -- Starts loose for the seen size, lifts by some millimetres, and closes further until the object is held; then closes
 -- to the least grip that held and a margin. Repeated grasps begin where the last one ended.
-local function by_trial(name, instances, object)
+local function by_trial(name, arm, object)
   local constants, depths, tightest = trial_constants[name], {}, 0
-  for index, one in ipairs((with_windows(instances, object.name, INSTANCES))) do
-    depths[index] = command_depth(one.window.loose, one.window) / one.instance.scale
-    tightest = math.max(tightest, command_depth(one.window.tight, one.window) / one.instance.scale)
+  local stiffness = arm.finger_stiffness
+  for index, one in ipairs((with_windows(arm.instances, object.name, INSTANCES, stiffness))) do
+    depths[index] = command_depth(one.window.loose, one.window, stiffness) / one.instance.scale
+    tightest = math.max(tightest, command_depth(one.window.tight, one.window, stiffness) / one.instance.scale)
   end
   if #depths == 0 then return nil end
   table.sort(depths)
   local indentation = constants.start * depths[math.ceil(LOOSEST * #depths)] * object.scale
-  return function(arm, scene, chosen, contact)
+  return function(scene, chosen, contact)
     local try = TRIALS[name](arm, scene, chosen, object.name, constants)
     while true do
       close_to_command(arm, contact - indentation)
@@ -330,28 +332,29 @@ local function by_trial(name, instances, object)
   end
 end
 
--- The grip of a controller for an object: close(arm, scene, chosen), with the grasp of grasp.choose. Nil for an object
+-- The grip of a controller for an object: close(scene, chosen), with the grasp of grasp.choose. Nil for an object
 -- without a safe window, which any grip holds.
-function blind_grips.controller(name, instances, object)
+function blind_grips.controller(name, arm, object)
   local close
   if TRIALS[name] then
-    close = by_trial(name, instances, object)
+    close = by_trial(name, arm, object)
   else
-    local best = blind_grips.best(name, blind_grips.sample(name, instances, object.name))
+    local sample = blind_grips.sample(name, arm.instances, object.name, nil, arm.finger_stiffness)
+    local best = blind_grips.best(name, sample)
     close = best
-      and function(arm, _, _, contact)
+      and function(_, _, contact)
         LAWS[name].close(arm, best.value * object.scale ^ best.size_power, contact, best.power)
       end
   end
   return close
-    and function(arm, scene, chosen)
+    and function(scene, chosen)
       grasp.approach(arm, object, chosen.width)
       -- States that the hand holds something from here on.
       arm:grasp(arm.closure, { rate = RATE })
       -- What shows of the object is its size: first contact is at the same width as for the nominal instance of that
       -- size.
       local nominal = grasp.window { asset = object.asset, scale = object.scale }
-      close(arm, scene, chosen, chosen.is_nominal and nominal.contact or chosen.width)
+      close(scene, chosen, chosen.is_nominal and nominal.contact or chosen.width)
     end
 end
 

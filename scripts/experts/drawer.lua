@@ -10,11 +10,11 @@
 -- the front and stands out most.
 local frames = require "experts.frames"
 local grasp = require "experts.grasp"
-local hand = require "experts.hand"
 local mechanism = require "experts.mechanism"
 local places = require "experts.places"
 local posture = require "experts.posture"
 
+local hand = softvt.hand()
 local FIELDS = { joint = "string", share = "number?", close = "boolean?", speed = "number?" }
 local OPEN_SHARE, CLOSED_SHARE, SPEED = 0.85, 0.02, 0.1
 -- Distance of the tool from the bar when the fingers grasp it, so that their tips stay clear of the front; distance in
@@ -24,11 +24,11 @@ local TIP, APPROACH, ABOVE = 0.005, 0.09, 0.16
 local BAR_CLEARANCE, CLEARANCE = 0.012, 0.001
 -- Rotations of the hand about its fingers to try, rad.
 local ROLLS = { 0, math.rad(25), math.rad(-25), math.rad(45), math.rad(-45) }
--- Angle of the fingers below the horizontal in a push, rad, and half thickness of a finger along the hand's x axis, m.
-local PUSH_TILT, FINGER = math.rad(60), 0.014
+-- Angle of the fingers below the horizontal in a push, rad.
+local PUSH_TILT = math.rad(60)
 -- Place of the leading edge of the tips in a push, from the tool towards the drawer and downwards, m.
-local EDGE_OUT = hand.CASE * math.cos(PUSH_TILT) + FINGER * math.sin(PUSH_TILT)
-local EDGE_DOWN = hand.CASE * math.sin(PUSH_TILT) - FINGER * math.cos(PUSH_TILT)
+local EDGE_OUT = hand.case_below * math.cos(PUSH_TILT) + hand.case_across * math.sin(PUSH_TILT)
+local EDGE_DOWN = hand.case_below * math.sin(PUSH_TILT) - hand.case_across * math.cos(PUSH_TILT)
 -- Distance from the bar before a push, and how far the push goes beyond the end, m.
 local STANDOFF, OVERSHOOT = 0.03, 0.003
 -- Sliding of the bar between the gels while it is pulled, m.
@@ -58,11 +58,11 @@ local function hands(bar, out, radius)
   for _, roll in ipairs(ROLLS) do
     for _, sign in ipairs { 1, -1 } do
       local closing = frames.rotated({ 0, 0, sign }, forward, roll)
-      local width = 2 * (radius / math.cos(roll) + FINGER * math.abs(math.tan(roll)))
+      local width = 2 * (radius / math.cos(roll) + hand.case_across * math.abs(math.tan(roll)))
       local function at(distance, height)
         return frames.hand(frames.add(frames.add(bar, out, distance), UP, height or 0), forward, closing)
       end
-      list[#list + 1] = { at = at, width = width, opening = math.min(0.08, width + 2 * BAR_CLEARANCE) }
+      list[#list + 1] = { at = at, width = width, opening = math.min(hand.stroke, width + 2 * BAR_CLEARANCE) }
     end
   end
   return list

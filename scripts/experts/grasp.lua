@@ -1,11 +1,12 @@
 -- Grasps from above with a known closure: across the object's narrow side or by its rim, where the hand has clearance.
-local hand = require "experts.hand"
 
 -- SPREAD: largest displacement of an expert's grasp in each horizontal direction, m, so that demonstrations differ.
--- CONTACT_CLEARANCE: distance of each gel from the object at which closing becomes slow, m.
-local grasp = { SPREAD = 0.0015, CONTACT_CLEARANCE = 0.002 }
+-- CONTACT_CLEARANCE: distance of each gel from the object at which closing becomes slow, m. SQUEEZE: what the target
+-- width of a rigid object is below its width, m.
+local grasp = { SPREAD = 0.0015, CONTACT_CLEARANCE = 0.002, SQUEEZE = 0.012 }
 
-local STROKE, CASE, FORCE = hand.STROKE, hand.CASE, hand.FORCE
+local hand = softvt.hand()
+local STROKE, CASE = hand.stroke, hand.case_below
 -- Clearance to leave below the cases and around the fingers, m.
 local UNDER, FINGER_CLEARANCE = 0.0015, 0.004
 -- Step of the rotations tried for clearance.
@@ -14,8 +15,6 @@ local STEP = math.rad(7.5)
 local FAST_RATE = 0.6
 -- Width by which a command may exceed that of its grip, m.
 local COMMAND_MARGIN = 0.002
--- Squeeze of a rigid object: the target width is below its width by this much, m.
-local SQUEEZE = 0.012
 
 -- Maps a yaw to [-90°, 90°]: a two-fingered hand closes along the same line after half a turn.
 local function wrap_half_turn(yaw)
@@ -111,15 +110,15 @@ end
 -- rigid object, given as a command: its force is 0.
 function grasp.target(object, share)
   local window = grasp.window(object)
-  if not window then return { width = grasp.width(object) - SQUEEZE, force = 0 } end
+  if not window then return { width = grasp.width(object) - grasp.SQUEEZE, force = 0 } end
   local function between(key) return window.loose[key] + share * (window.tight[key] - window.loose[key]) end
   return { width = between "width", force = between "force" }
 end
 
 -- What the hand lacks for a grip; nil if nothing. The window of a slippery object may ask for such grips. A grip that
 -- ends when the pads press has no width.
-local function beyond_hand(grip, stop)
-  if grip.force > FORCE then return ("a force of %.0f N on each pad"):format(grip.force) end
+local function beyond_hand(arm, grip, stop)
+  if grip.force > arm.finger_effort then return ("a force of %.0f N on each pad"):format(grip.force) end
   if stop ~= "touch" and (grip.width < 0 or grip.width > STROKE) then
     return ("a width of %.1f mm"):format(1e3 * grip.width)
   end
@@ -127,7 +126,7 @@ end
 
 -- Width of the command that holds a grip, m: each finger is a spring, which the force on its pad displaces from its
 -- target. Without a stiffness of the drives (N/m), that of the standard hand.
-function grasp.command_width(grip, stiffness) return grip.width - 2 * grip.force / (stiffness or hand.STIFFNESS) end
+function grasp.command_width(grip, stiffness) return grip.width - 2 * grip.force / (stiffness or hand.finger_stiffness) end
 
 -- The closure of that command.
 function grasp.command(grip, stiffness)
@@ -219,7 +218,7 @@ function grasp.close(arm, object, grip, options)
   local most = grasp.command(grip, arm.finger_stiffness)
   -- A hand that feels finds its own grip.
   if grip.force == 0 or arm.feels then return arm:grasp(most, { rate = rate }) end
-  local lack = beyond_hand(grip, options.stop)
+  local lack = beyond_hand(arm, grip, options.stop)
   if lack then arm:give_up(("%s needs %s, which the hand does not have"):format(object.name, lack)) end
   -- The command is bounded, in case the object yields or a pad misses it.
   most = math.min(1, most + COMMAND_MARGIN / STROKE)

@@ -82,7 +82,7 @@ local function grips(scene, knob, wanted)
       for _, back in ipairs(BACK) do
         for _, out in ipairs(OUT) do
           local grip = { tilt = tilt, back = back, out = out, width = faces[1], angle = angle, sign = 1 }
-          local open = { width = math.min(0.08, grip.width + 2 * GRIP_CLEARANCE) }
+          local open = { width = math.min(softvt.hand().stroke, grip.width + 2 * GRIP_CLEARANCE) }
           if scene:clearance(hand(knob, grip, angle), open) >= CLEARANCE then
             grip.turn = reach_of(scene, knob, grip, angle, wanted)
             if math.abs(grip.turn) >= math.min(LEAST_STROKE, math.abs(wanted)) then list[#list + 1] = grip end

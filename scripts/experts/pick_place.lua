@@ -71,7 +71,7 @@ local function pick(arm, scene, spec, pace, share, close)
   arm:wait(0.1)
   local before = scene:object(spec.object).centre[3]
   if close then
-    close(arm, scene, chosen)
+    close(scene, chosen)
   else
     -- The width of a grip is that where the calibration presses; elsewhere the hand stops by force.
     local grip, stop = grasp.target(object, share), chosen.is_nominal and spec.stop or "touch"
@@ -252,7 +252,7 @@ local function make(_, spec, surplus)
     local problem = grasp.problem(scene:object(spec.object))
     if problem then arm:give_up(spec.object .. " " .. problem) end
     local controller = arm.grip_controller
-    local close = controller and blind_grips.controller(controller, arm.instances, scene:object(spec.object))
+    local close = controller and blind_grips.controller(controller, arm, scene:object(spec.object))
     if not (spec.closure or close) and grasp.window(scene:object(spec.object)) then arm:note("grip_share", share) end
     local first, reason = scene:object(spec.object).centre, nil
     for _ = 1, ATTEMPTS do

@@ -1,4 +1,6 @@
 -- Changes between a hand that points down and a hand in another orientation.
+local grasp = require "experts.grasp"
+
 local posture = {}
 
 -- Time after which the arm has arrived, s, and the largest distance from a pose where it has, m.
@@ -7,8 +9,6 @@ local SETTLE, ARRIVED = 0.2, 0.01
 local TURN_HEIGHT, TURN_SPEED = 0.33, 1
 -- Motion close to an object.
 local NEAR = { speed = 0.2, angular_speed = TURN_SPEED }
--- Squeeze of a rigid part: the target width is below its width by this much, m.
-local SQUEEZE = 0.012
 
 -- Moves the tool straight up to at least a height, m.
 function posture.rise(arm, height)
@@ -59,7 +59,7 @@ end
 -- Closes firmly on something rigid of a width (m), or the empty hand for a width of 0. A tactile servo lifts what it
 -- grasps, so the hand then closes without it.
 function posture.clamp(arm, width)
-  local closure, rate = math.min(1, 1 - (width - SQUEEZE) / arm.stroke), { rate = width > 0 and 0.5 or 1 }
+  local closure, rate = math.min(1, 1 - (width - grasp.SQUEEZE) / arm.stroke), { rate = width > 0 and 0.5 or 1 }
   if arm.feels then
     arm:close_to(closure, rate)
   else

@@ -8,18 +8,16 @@
 -- the object at the fingers; one that rolls away is pushed again, up to three times.
 local frames = require "experts.frames"
 local grasp = require "experts.grasp"
-local hand = require "experts.hand"
 local places = require "experts.places"
 local posture = require "experts.posture"
 local route = require "experts.route"
 
+local hand = softvt.hand()
 local FIELDS = { object = "string", target = "string", to = "string?", distance = "number?", speed = "number?" }
 local SPEED = 0.05
 -- Distance of the fingers from the object before the push, height of the sensor cases above the support, clearance to
 -- leave around the hand, and accepted distance from the place, m.
 local STANDOFF, UNDER, CLEARANCE, TOLERANCE = 0.02, 0.003, 0.002, 0.01
--- Half thickness of a finger along the hand's x axis, m.
-local FINGER = 0.014
 -- Distance from the place at which a push ends, m.
 local ARRIVED = 0.002
 -- Distance of the retreat, m, and attempts.
@@ -32,9 +30,9 @@ local function length(v) return math.sqrt(frames.dot(v, v)) end
 
 -- The hand behind the object, which pushes along the horizontal unit vector `along`.
 local function start_pose(object, along)
-  local back = places.half_extent(object, along) + FINGER + STANDOFF
+  local back = places.half_extent(object, along) + hand.case_across + STANDOFF
   local at = frames.add(object.centre, along, -back)
-  at[3] = grasp.bottom(object) + hand.CASE + UNDER
+  at[3] = grasp.bottom(object) + hand.case_below + UNDER
   return softvt.pose { position = at, yaw = frames.half_turn_yaw(along) }
 end
 

@@ -1,5 +1,5 @@
 -- Heights at which the hand passes above obstacles.
-local hand = require "experts.hand"
+local hand = softvt.hand()
 
 local route = {}
 
@@ -33,7 +33,7 @@ function route.carry_height(scene, from, to, carried, margin)
       top = math.max(top, object.centre[3] + object.size[3] / 2)
     end
   end
-  return top + math.max(hand.CASE, carried.below) + margin
+  return top + math.max(hand.case_below, carried.below) + margin
 end
 
 -- Returns the lowest height of the tool centre point, at least `rise` (m) above `pose`, at which the empty hand moves

@@ -4,7 +4,7 @@
 -- scripts/softvt/servo.lua.
 --
 --   softvt suites/object_soft.lua --policy scripts/policies/feel_and_lift.lua --episodes 1
-local MM = 1 / 80 -- closure per mm of width between the gels
+local MM = 1e-3 / softvt.hand().stroke -- closure per mm of width between the gels
 local DOWN, LOWEST, LIFT = 10, 25, 100 -- mm per control step; height above the base, and lift, mm
 local TOUCHED, COUNT = 4e-4, 8 -- divergence of the markers of a gel that is touched; readings averaged
 local CLOSING, SLIDE = 0.1, 15 -- mm per control step until touch; steps of lifting, 0.1 mm each, until the gels slide

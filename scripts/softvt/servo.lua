@@ -4,12 +4,12 @@
 -- little and the object stays with it. The hand tightens beyond that grip by a margin, goes back down, closes to it,
 -- and keeps it. Its readings are the markers and its own closure. Its parameters describe gels and markers only, not
 -- the object.
-local servo = {}
+local servo, stroke = {}, ...
 
 local max, min, ceil = math.max, math.min, math.ceil
 
 -- Change of closure per mm of width between the gels.
-local MM = 1 / 80
+local MM = 1e-3 / stroke
 
 -- Noise of the mean motion along x of the markers of both fingers, px: 0.1 px per marker.
 local NOISE = 0.007

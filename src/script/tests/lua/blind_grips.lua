@@ -41,4 +41,8 @@ function alike:sample(object, count)
 end
 local function share(name) return blind_grips.best(name, blind_grips.sample(name, alike, "ball")).share end
 assert(share("size-seen") == 1 and share("fixed-closure") < 0.9, share("fixed-closure"))
+
+-- A hand with softer drives has to be commanded further for the same grips.
+local soft = blind_grips.sample("size-seen", drawn(1, size), "ball", nil, 1000)
+assert(blind_grips.best("size-seen", soft).value > best("size-seen", size).value)
 return suite(pair)
