@@ -26,7 +26,7 @@ fn block(size: Vec3, resolution: usize, youngs_pa: f64, poisson: f64) -> FemStat
 fn deform(body: &mut FemState, place: impl Fn(&Vec3) -> Vec3) {
     let rest = body.model.clone();
     body.x.iter_mut().zip(&rest.mesh.nodes).for_each(|(x, p)| *x = place(p));
-    body.update_elastic();
+    body.update_elastic(0.0);
 }
 
 /// Homogeneous strain of 4³ voxels with a displacement gradient of up to 0.2 %: largest force on an inner node over the
@@ -105,7 +105,7 @@ fn solve_linear(mut body: FemState, free: &[bool], load: &[Vec3]) -> Vec<Vec3> {
         let mut side = |sign: f64| {
             let moved = rest.mesh.nodes.iter().zip(v).map(|(p, v)| p + v * (sign * scale));
             body.x.iter_mut().zip(moved).for_each(|(x, p)| *x = p);
-            body.update_elastic();
+            body.update_elastic(0.0);
             body.force.clone()
         };
         let (up, down) = (side(1.0), side(-1.0));

@@ -5,8 +5,9 @@ use std::sync::Arc;
 use super::{
     densification::{self, Densification},
     element::{self, Stiffness},
-    force::{self, ElementCorners, elastic},
+    force::{self, ElementCorners, Relaxing, elastic},
     material::ElasticMaterial,
+    relaxation::{Branch, Relaxation},
     rotation::polar,
 };
 use softvt_geometry::{
@@ -72,6 +73,8 @@ pub struct FemModel {
     /// Share of material, parallel to `stiffness`.
     pub(super) share: Vec<f64>,
     pub(super) densification: Densification,
+    /// Damping by the material's loss factor; `None` for a material without one.
+    pub(crate) relaxation: Option<Relaxation>,
     is_checked: Vec<bool>,
 }
 
@@ -159,6 +162,7 @@ impl FemModel {
             mean: fills.iter().map(|fill| element::mean_gradients(h, fill)).collect(),
             share: fills.iter().map(element::material_share).collect(),
             densification: Densification::new(&material, h),
+            relaxation: material.relaxation(),
             mesh,
         })
     }
@@ -268,6 +272,8 @@ pub struct FemState {
     pub elastic_energy: f64,
     /// Largest curvature of the densification of each element at `x`.
     pub(super) densification: Vec<f64>,
+    /// The Maxwell branch of each element; none for a material without loss factor.
+    branches: Vec<Branch>,
     min_det_f: MinDetF,
 }
 
@@ -285,14 +291,18 @@ impl FemState {
             force: vec![Vec3::zeros(); nodes],
             elastic_energy: 0.0,
             densification: vec![0.0; model.mesh.elements.len()],
+            branches: model
+                .relaxation
+                .map_or(Vec::new(), |_| vec![Branch::default(); model.mesh.elements.len()]),
             min_det_f: MinDetF { det_f: 1.0, element: 0 },
             x,
             model,
         }
     }
 
-    /// Updates rotations, forces, energy and volume ratios for the current positions.
-    pub fn update_elastic(&mut self) {
+    /// Updates rotations, forces, energy and volume ratios for the current positions, to which the body has moved
+    /// within `dt`, s.
+    pub fn update_elastic(&mut self, dt: f64) {
         let rest = &*self.model;
         self.force.fill(Vec3::zeros());
         self.elastic_energy = 0.0;
@@ -302,7 +312,9 @@ impl FemState {
             let x: ElementCorners = std::array::from_fn(|c| self.x[nodes[c] as usize]);
             let kind = rest.stiffness_of[e] as usize;
             let (k0, mean_gradients) = (&rest.stiffness[kind], &rest.mean[kind]);
-            let mut result = elastic(&x, &rest.corners, mean_gradients, k0, self.rotation[e]);
+            let relaxing = self.branches.get_mut(e).zip(rest.relaxation);
+            let relaxing = relaxing.map(|(branch, law)| Relaxing { branch, share: law.share, dt });
+            let mut result = elastic(&x, &rest.corners, mean_gradients, k0, self.rotation[e], relaxing);
             let det_f = force::min_det(&x, rest.mesh.edge);
             if rest.is_checked[e] && det_f < self.min_det_f.det_f {
                 self.min_det_f = MinDetF { det_f, element: e };
@@ -347,6 +359,18 @@ impl FemState {
     fn weighted(&self, values: &[Vec3]) -> Vec3 {
         let sum: Vec3 = values.iter().zip(&self.model.mass).map(|(x, m)| x * *m).sum();
         sum / self.model.total_mass()
+    }
+
+    /// Velocity of a contact sample of a group, m/s.
+    pub(crate) fn sample_velocity(&self, group: usize, sample: usize) -> Vec3 {
+        let (group, sample) = (&self.model.groups[group], &self.model.samples[sample]);
+        let nodes = group.nodes[..group.count].iter().zip(&sample.weights);
+        nodes.map(|(&node, weight)| self.v[node as usize] * *weight).sum()
+    }
+
+    /// Momentum of each node, N s.
+    pub fn momenta(&self) -> impl Iterator<Item = Vec3> {
+        self.v.iter().zip(&self.model.mass).map(|(v, m)| v * *m)
     }
 
     /// Kinetic energy, J.

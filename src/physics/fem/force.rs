@@ -1,6 +1,9 @@
 //! Elastic force of one element and its energy.
 
-use super::rotation::{polar, positive_inverse, stretch_hessian};
+use super::{
+    relaxation::Branch,
+    rotation::{polar, positive_inverse, stretch_hessian},
+};
 use softvt_geometry::{Mat3, Vec3};
 
 /// Corner positions or forces of an element.
@@ -16,18 +19,30 @@ pub struct ElasticResponse {
     pub energy: f64,
 }
 
+/// An element with a Maxwell branch that moves to its positions within `dt` (s).
+pub struct Relaxing<'a> {
+    /// Its branch.
+    pub branch: &'a mut Branch,
+    /// Stiffness of the branch over that of the element.
+    pub share: f64,
+    /// Duration of the motion, s.
+    pub dt: f64,
+}
+
 /// Force and energy of an element at world corner positions `x`.
 ///
 /// `rest` are the undeformed corners (m), `g` mean shape gradients (1/m, with any weights), `k0` the rest stiffness
 /// (N/m, column-major 24×24), and `last` is an estimate of the rotation. The force is `f_a = −R (p_a − q × g_a)` with
 /// `p = K₀ (y − X)`, `m = Σ y_a × p_a`, `S = Rᵀ F`, `q = (tr S I − S)⁻¹ m`: the second term is due to the change of the
-/// rotation itself. Without it the force is not the derivative of the energy and has a spurious moment.
+/// rotation itself. Without it the force is not the derivative of the energy and has a spurious moment. A
+/// [`Relaxing`] element adds `K₀ g d` to `p`.
 pub fn elastic(
     x: &ElementCorners,
     rest: &ElementCorners,
     g: &[Vec3; 8],
     k0: &[f64; 576],
     last: Mat3,
+    relaxing: Option<Relaxing>,
 ) -> ElasticResponse {
     let f = deformation_gradient(x, g);
     let r = polar(&f, last);
@@ -39,8 +54,15 @@ pub fn elastic(
         let d = y[a] - (rest[a] - rest[0]);
         u[3 * a..3 * a + 3].copy_from_slice(d.as_slice());
     }
-    let p = multiply(k0, &u);
-    let energy = 0.5 * p.iter().zip(&u).map(|(p, u)| p * u).sum::<f64>();
+    let work = |p: &[f64; 24], u: &[f64; 24]| 0.5 * p.iter().zip(u).map(|(p, u)| p * u).sum::<f64>();
+    let mut p = multiply(k0, &u);
+    let mut energy = work(&p, &u);
+    if let Some(Relaxing { branch, share, dt }) = relaxing {
+        let stretch = branch.advance(&u, dt);
+        let extra = multiply(k0, stretch);
+        energy += share * work(&extra, stretch);
+        p.iter_mut().zip(extra).for_each(|(p, extra)| *p += share * extra);
+    }
     let corner = |a: usize| Vec3::new(p[3 * a], p[3 * a + 1], p[3 * a + 2]);
     let moment: Vec3 = (1..8).map(|a| y[a].cross(&corner(a))).sum();
     // An inverted or flattened element has no unique rotation; its projection term is left out there.
@@ -140,7 +162,7 @@ mod tests {
     }
 
     fn evaluate(x: &ElementCorners, fill: &OccupancyMask, last: Mat3) -> ElasticResponse {
-        elastic(x, &cube(), &mean_gradients(H, fill), &stiffness(H, fill, &material()), last)
+        elastic(x, &cube(), &mean_gradients(H, fill), &stiffness(H, fill, &material()), last, None)
     }
 
     fn bent(e: &[f64]) -> ElementCorners {
@@ -182,7 +204,7 @@ mod tests {
         ) {
             let (x, fill) = (bent(&e), fills()[kind]);
             let (g, k0) = (mean_gradients(H, &fill), stiffness(H, &fill, &material()));
-            let evaluate = |x: &ElementCorners, last: Mat3| elastic(x, &cube(), &g, &k0, last);
+            let evaluate = |x: &ElementCorners, last: Mat3| elastic(x, &cube(), &g, &k0, last, None);
             let at = evaluate(&x, Mat3::identity());
             let scale = at.force.iter().map(|f| f.norm()).fold(0.0, f64::max);
             let step = 1e-6 * H;

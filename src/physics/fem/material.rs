@@ -2,6 +2,7 @@
 
 use serde::Serialize;
 
+use super::relaxation::Relaxation;
 use softvt_common::range::{Range, RangeError};
 
 /// Isotropic, linearly elastic material. All its parameters are in their ranges: [`Self::new`] checks them.
@@ -10,6 +11,12 @@ pub struct ElasticMaterial {
     youngs_pa: f64,
     poisson: f64,
     density: f64,
+    #[serde(skip_serializing_if = "is_zero")]
+    loss_factor: f64,
+}
+
+fn is_zero(value: &f64) -> bool {
+    *value == 0.0
 }
 
 impl ElasticMaterial {
@@ -20,6 +27,9 @@ impl ElasticMaterial {
     /// Range of the density, kg/m³: usually from that of light foam to that of osmium.
     pub const DENSITY: Range = Range::POSITIVE.usually(5.0, 23_000.0);
 
+    /// Range of the loss factor tan δ from 1 to 10 Hz. 0 stands for a material whose damping is that of the world.
+    pub const LOSS_FACTOR: Range = Range::closed(0.0, 0.6);
+
     /// A material with this Young's modulus (Pa), Poisson's ratio and density (kg/m³).
     ///
     /// # Errors
@@ -28,10 +38,29 @@ impl ElasticMaterial {
         Self::YOUNGS_PA.check("youngs_pa", youngs_pa, "Pa")?;
         Self::POISSON.check("poisson", poisson, "")?;
         Self::DENSITY.check("density", density, "kg/m³")?;
-        Ok(Self { youngs_pa, poisson, density })
+        Ok(Self { youngs_pa, poisson, density, loss_factor: 0.0 })
     }
 
-    /// Young's modulus, Pa.
+    /// The same material with another loss factor.
+    ///
+    /// # Errors
+    /// It is out of its range.
+    pub fn with_loss_factor(self, loss_factor: f64) -> Result<Self, RangeError> {
+        Self::LOSS_FACTOR.check("loss_factor", loss_factor, "")?;
+        Ok(Self { loss_factor, ..self })
+    }
+
+    /// Loss factor tan δ from 1 to 10 Hz.
+    pub fn loss_factor(&self) -> f64 {
+        self.loss_factor
+    }
+
+    /// Its damping, if it has a loss factor.
+    pub(super) fn relaxation(&self) -> Option<Relaxation> {
+        (self.loss_factor > 0.0).then(|| Relaxation::new(self.loss_factor))
+    }
+
+    /// Young's modulus at rest, Pa.
     pub fn youngs_pa(&self) -> f64 {
         self.youngs_pa
     }
@@ -51,7 +80,7 @@ impl ElasticMaterial {
     /// # Errors
     /// It is out of its range.
     pub fn with_youngs_pa(self, youngs_pa: f64) -> Result<Self, RangeError> {
-        Self::new(youngs_pa, self.poisson, self.density)
+        Self::new(youngs_pa, self.poisson, self.density)?.with_loss_factor(self.loss_factor)
     }
 
     /// The same material with another Poisson's ratio.
@@ -59,7 +88,7 @@ impl ElasticMaterial {
     /// # Errors
     /// It is out of its range.
     pub fn with_poisson(self, poisson: f64) -> Result<Self, RangeError> {
-        Self::new(self.youngs_pa, poisson, self.density)
+        Self::new(self.youngs_pa, poisson, self.density)?.with_loss_factor(self.loss_factor)
     }
 
     /// The same material with another density, kg/m³.
@@ -67,7 +96,7 @@ impl ElasticMaterial {
     /// # Errors
     /// It is out of its range.
     pub fn with_density(self, density: f64) -> Result<Self, RangeError> {
-        Self::new(self.youngs_pa, self.poisson, density)
+        Self::new(self.youngs_pa, self.poisson, density)?.with_loss_factor(self.loss_factor)
     }
 
     /// First Lamé parameter λ, Pa.

@@ -11,6 +11,7 @@ pub(crate) mod densification;
 pub mod element;
 pub mod force;
 pub mod material;
+pub(crate) mod relaxation;
 pub mod rigid_motion;
 pub mod rotation;
 pub mod strain;

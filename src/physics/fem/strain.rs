@@ -271,7 +271,7 @@ mod tests {
         ) {
             let mut state = cube();
             state.x.iter_mut().zip(&offsets).for_each(|(x, offset)| *x += Vec3::from(*offset) * size);
-            state.update_elastic();
+            state.update_elastic(0.0);
             let mut meter =
                 StrainMeter::new(&state.model, StrainLimits { collapse: Some(limit), damage: None });
             meter.update(&state);

@@ -3,10 +3,13 @@
 
 use std::collections::HashMap;
 
-use super::{Articulation, StepFailure, World};
+use super::{
+    Articulation, StepFailure, World,
+    substeps::{mass_ratio, step_coefficients},
+};
 use crate::{
     contact::ColliderMotion,
-    fem::{rigid_motion::RigidVelocity, system::StepCoefficients},
+    fem::rigid_motion::RigidVelocity,
     ids::{ArticulationId, BodyId, ColliderId, LinkId, RigidId, SoftId},
     joints,
     rigid::{TorqueFreeRotation, torque_free_rotation},
@@ -127,11 +130,7 @@ impl World {
     /// from a common rigid motion. In contact, the brake is a force that the contacts balance, and that is zero at
     /// rest.
     fn add_soft_blocks(&mut self) -> Result<(), StepFailure> {
-        let c = StepCoefficients {
-            dt: self.params.dt,
-            rayleigh_mass: self.params.rayleigh_mass,
-            rayleigh_stiffness: self.params.rayleigh_stiffness,
-        };
+        let mass_ratio = mass_ratio(&self.params, self.last_dt);
         self.blocks.soft.clear();
         self.blocks.rigid_parts.clear();
         for (index, soft) in self.soft.iter_mut().enumerate() {
@@ -141,27 +140,38 @@ impl World {
                 continue;
             }
             let body = &soft.state;
+            let c = step_coefficients(&self.params, self.last_dt, &body.model);
             soft.system.update(body, &c, soft.steps_awake).map_err(|NotPositiveDefinite| {
                 StepFailure::Indefinite { step: self.step, body: soft.name.clone() }
             })?;
             let momentum = &mut self.blocks.momentum;
             momentum.clear();
-            momentum.extend(
-                (0..body.x.len())
-                    .map(|n| (body.v[n] + self.gravity * c.dt) * body.model.mass[n] + body.force[n] * c.dt),
-            );
-            let damping = 1.0 + c.rayleigh_mass * c.dt;
+            momentum.extend((0..body.x.len()).map(|n| {
+                (body.v[n] * mass_ratio + self.gravity * c.dt) * body.model.mass[n] + body.force[n] * c.dt
+            }));
             let rigid_part = match soft.assembly {
                 Some(assembly) => self.blocks.flights[assembly],
                 None if self.candidates.involves(SoftId::new(index)) => None,
                 None => {
-                    let undamped = momentum.iter().map(|p| p / damping);
+                    let undamped = momentum.iter().map(|p| p / c.mass);
                     Some(RigidVelocity::with_momenta(body, undamped))
                 }
             };
+            if c.start > 0.0 {
+                let own = RigidVelocity::with_momenta(body, body.momenta());
+                soft.system.add_tangent(
+                    body,
+                    &c,
+                    |v, x| match &rigid_part {
+                        Some(rigid) => (v - rigid.at(x)) * c.start,
+                        None => v * c.start + own.at(x) * c.rigid,
+                    },
+                    momentum,
+                );
+            }
             if let Some(rigid) = &rigid_part {
                 for ((p, x), m) in momentum.iter_mut().zip(&body.x).zip(&body.model.mass) {
-                    *p -= rigid.at(x) * (damping * m);
+                    *p -= rigid.at(x) * (c.mass * m);
                 }
             }
             let dim = 3 * soft.system.retained().len();
@@ -186,7 +196,7 @@ impl World {
     fn add_rigid_blocks(&mut self) {
         self.blocks.rigid.clear();
         self.blocks.torque_free_rotations.clear();
-        let dt = self.params.dt;
+        let (dt, mass_ratio) = (self.params.dt, mass_ratio(&self.params, self.last_dt));
         for (index, rigid) in self.rigid.iter().enumerate() {
             let body = &rigid.state;
             let spin = torque_free_rotation(body, dt);
@@ -195,9 +205,9 @@ impl World {
                 self.blocks.rigid.push(None);
                 continue;
             }
-            let inertia = body.inertia_w();
+            let (mass, inertia) = (body.mass * mass_ratio, body.inertia_w() * mass_ratio);
             let mut matrix = vec![0.0; 36];
-            (0..3).for_each(|i| matrix[7 * i] = body.mass);
+            (0..3).for_each(|i| matrix[7 * i] = mass);
             for (r, c) in (0..9).map(|e| (e % 3, e / 3)) {
                 matrix[(3 + c) * 6 + 3 + r] = inertia[(r, c)];
             }
@@ -209,7 +219,7 @@ impl World {
                 }
                 None => (body.v, body.w, spin.end_w),
             };
-            let linear = (v + self.gravity * dt) * body.mass;
+            let linear = (v * mass_ratio + self.gravity * dt) * body.mass;
             let angular = inertia * end_w;
             let stack = |a: &Vec3, b: &Vec3| [a.as_slice(), b.as_slice()].concat();
             self.blocks.rigid.push(Some(self.problem.blocks.len()));
@@ -226,7 +236,7 @@ impl World {
 
     fn add_articulation_blocks(&mut self) {
         self.blocks.articulations.clear();
-        let dt = self.params.dt;
+        let (dt, mass_ratio) = (self.params.dt, mass_ratio(&self.params, self.last_dt));
         for (index, articulation) in self.articulations.iter_mut().enumerate() {
             let root = LinkId { articulation: ArticulationId::new(index), index: 0 };
             if articulation.sleep.is_asleep {
@@ -235,7 +245,7 @@ impl World {
             }
             let Articulation { tree, poses, state, .. } = articulation;
             let n = tree.dofs();
-            let mut mass = joints::mass_matrix(tree, poses);
+            let mut mass = joints::mass_matrix(tree, poses) * mass_ratio;
             let gravity = if articulation.has_gravity { self.gravity } else { Vec3::zeros() };
             let bias = joints::bias(tree, poses, state.v.as_slice(), &gravity);
             let rhs = &mass * &state.v - bias * dt;

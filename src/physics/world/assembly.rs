@@ -1,6 +1,6 @@
 //! Assemblies: bodies that attachments join. They sleep and wake together, and fly as one body.
 
-use super::{World, state::SleepState};
+use super::{World, state::SleepState, substeps::mass_ratio};
 use crate::{
     fem::rigid_motion::RigidVelocity,
     ids::{ArticulationId, BodyId, ContactPartner, LinkId, RigidId, SoftId},
@@ -195,7 +195,7 @@ impl World {
     pub(super) fn find_flights(&mut self) {
         let mut flights = std::mem::take(&mut self.blocks.flights);
         flights.clear();
-        let gain = self.gravity * self.params.dt;
+        let gain = self.gravity * (self.params.dt / mass_ratio(&self.params, self.last_dt));
         flights.extend((0..self.assemblies.len()).map(|index| {
             let momentum = |part: &Part| (part.v + gain) * part.mass;
             let parts = || Aggregate::new(self.parts(index), |part| part.damped_mass, momentum);
@@ -206,7 +206,8 @@ impl World {
 
     /// The nodes and rigid bodies of an assembly.
     fn parts(&self, index: usize) -> impl Iterator<Item = Part> + Clone {
-        let damping = 1.0 + self.params.rayleigh_mass * self.params.dt;
+        let damping =
+            1.0 + self.params.rayleigh_mass * self.params.dt / mass_ratio(&self.params, self.last_dt);
         let members = self.assemblies[index].members.iter();
         let nodes = members.clone().filter_map(|member| member.soft()).flat_map(move |id| {
             let body = &self.soft(id).state;
@@ -313,6 +314,6 @@ impl World {
             }
         });
         let flown = self.soft.iter_mut().filter(|soft| soft.assembly == Some(index));
-        flown.for_each(|soft| soft.state.update_elastic());
+        flown.for_each(|soft| soft.state.update_elastic(dt));
     }
 }

@@ -30,7 +30,7 @@ impl World {
     ) -> SoftId {
         let modulus = model.contact_modulus();
         let mut state = FemState::new(model.clone(), pose);
-        state.update_elastic();
+        state.update_elastic(0.0);
         self.wake_all();
         self.soft.push(SoftBody {
             name: name.to_owned(),

@@ -22,12 +22,11 @@ impl World {
                 continue;
             }
             if let Some(rigid) = rigid_part {
-                let momenta = body.v.iter().zip(&body.model.mass).map(|(v, m)| v * *m);
-                let rest = RigidVelocity::with_momenta(body, momenta);
+                let rest = RigidVelocity::with_momenta(body, body.momenta());
                 body.v.iter_mut().zip(&body.x).for_each(|(v, x)| *v += rigid.at(x) - rest.at(x));
             }
             rigid_motion::advance(body, dt);
-            body.update_elastic();
+            body.update_elastic(dt);
         }
         for (i, rigid) in self.rigid.iter_mut().enumerate() {
             let Some(block) = self.blocks.rigid[i] else { continue };

@@ -47,6 +47,7 @@ mod sleep;
 mod snapshot;
 mod soft_contacts;
 mod state;
+mod substeps;
 
 use crate::{
     contact::{Collider, ColliderMotion, DetectionLimits},
@@ -163,6 +164,8 @@ pub struct World {
     /// Gravity, m/s². It may be changed between steps.
     pub gravity: Vec3,
     step: u64,
+    /// Length of the last step or part of one, s; 0 before the first.
+    last_dt: f64,
     soft: Vec<SoftBody>,
     rigid: Vec<RigidBody>,
     articulations: Vec<Articulation>,
@@ -219,14 +222,29 @@ impl World {
         self.step += 1;
         self.update_collider_motions();
         self.wake_disturbed();
+        self.count_steps_awake();
+        self.find_candidates();
+        match self.step_parts() {
+            1 => self.finish_step(),
+            parts => self.step_in_parts(parts),
+        }
+    }
+
+    /// Finds what may touch in a step of the present length.
+    fn find_candidates(&mut self) {
         self.detect_soft_collider();
         self.detect_soft_soft();
         self.mark_attached();
+    }
+
+    /// Solves and integrates a step whose candidates are known.
+    fn finish_step(&mut self) -> Result<(), StepFailure> {
         self.assemble()?;
         let solved = self.solver.solve(&mut self.problem);
         self.stats = solved
             .map_err(|f| StepFailure::Diverged { step: self.step, residual_ratio: f.residual_ratio })?;
         self.integrate();
+        self.last_dt = self.params.dt;
         self.record_contacts();
         self.record_bonds();
         self.update_soft_history();
@@ -281,7 +299,7 @@ impl World {
         self.wake_all();
         let body = &mut self.soft[id.index()].state;
         body.x.iter_mut().zip(&mut body.v).for_each(|(x, v)| change(x, v));
-        body.update_elastic();
+        body.update_elastic(0.0);
     }
 
     /// A free rigid body.

@@ -77,6 +77,36 @@ impl SoftRow {
 }
 
 impl World {
+    /// Advances the clock of each soft body that is awake.
+    pub(super) fn count_steps_awake(&mut self) {
+        self.soft.iter_mut().filter(|soft| !soft.is_asleep()).for_each(|soft| soft.steps_awake += 1);
+    }
+
+    /// Largest speed at which a sample of a soft body approaches what it will reach in this step, m/s. Of another soft
+    /// body, the motion of the centre counts.
+    pub(super) fn approach(&self, id: SoftId) -> f64 {
+        let body = &self.soft(id).state;
+        let speed = |group: usize, sample: usize, normal: &Vec3, gap: f64, other: &Vec3| {
+            let speed = normal.dot(&(other - body.sample_velocity(group, sample)));
+            if speed * self.params.dt > gap { speed } else { 0.0 }
+        };
+        let solid = self.candidates.collider.iter().filter(|found| found.soft == id).map(|found| {
+            let (at, motion) = (&found.candidate, &self.motions[found.collider.index()]);
+            speed(at.group, at.sample, &at.normal, at.gap, &motion.velocity(&at.p))
+        });
+        let soft = self.candidates.soft.iter().filter(|found| found.soft == id).map(|found| {
+            let at = &found.candidate;
+            speed(
+                at.group,
+                at.sample,
+                &at.contact.normal,
+                at.contact.gap,
+                &self.soft(found.other).state.velocity(),
+            )
+        });
+        solid.chain(soft).fold(0.0, f64::max)
+    }
+
     /// Finds samples near colliders, and marks the nodes that must be retained in the reduced systems.
     pub(super) fn detect_soft_collider(&mut self) {
         self.candidates.collider.clear();
@@ -84,7 +114,6 @@ impl World {
         let (mut found, mut bounds) = (Vec::new(), BodyBounds::default());
         let attachments = &self.attachments;
         for (index, soft) in self.soft.iter_mut().enumerate().filter(|(_, s)| !s.sleep.is_asleep) {
-            soft.steps_awake += 1;
             let (system, body, step) = (&mut soft.system, &soft.state, soft.steps_awake);
             bounds.update(body);
             for (id, (collider, motion)) in self.colliders.iter().zip(&self.motions).enumerate() {

@@ -55,7 +55,11 @@ record_of! {
         collapse_strain: Option<f64> = STRAIN;
         /// Compressive strain that leaves a visible crack or set.
         damage_strain: Option<f64> = STRAIN;
+        /// Loss factor tan δ, which is nearly constant from 1 to 10 Hz; youngs_pa is then the modulus at rest. 0 leaves
+        /// the damping to the setting physics.rayleigh_stiffness.
+        loss_factor: f64 = Type::Number("", ElasticMaterial::LOSS_FACTOR) => Number(0.0);
     } by |lua| ElasticMaterial::new(youngs_pa, poisson, density)
+        .and_then(|elastic| elastic.with_loss_factor(loss_factor))
         .map_err(|error| fail!(lua, "{}.{error}", SoftMaterial::RECORD.label))
         .map(|elastic| SoftMaterial { elastic, resolution, grasp_spacing, collapse_strain, damage_strain });
 }

@@ -1,0 +1,89 @@
+//! Division of a step in which something moves far: an impact, a body that rolls or whips.
+//!
+//! A step linearises the elastic force and the place of each contact at its start, and an impact loses the energy of
+//! what moves along within it. So no node of a body that touches may move far against the size of its voxels: the step
+//! is divided until each part is short enough. Average acceleration needs that; implicit Euler damps such motion.
+
+use super::{StepFailure, World};
+use crate::{
+    fem::{FemModel, system::StepCoefficients},
+    params::PhysicsParams,
+};
+use softvt_geometry::Pose;
+
+/// Largest way of a node in a part of a step, over the voxel edge: of its approach to what it will reach, and of its
+/// motion relative to the centre of its body.
+const LARGEST_WAY: f64 = 0.1;
+/// Largest number of parts.
+const MAX_PARTS: u32 = 32;
+/// Length of a step over that of the last one above which it is much longer.
+const LONGER: f64 = 1.5;
+
+impl World {
+    /// Number of parts into which the step is divided, by its contact candidates.
+    pub(super) fn step_parts(&self) -> u32 {
+        if !self.params.average_acceleration {
+            return 1;
+        }
+        let parts = self.soft_ids().filter(|&id| self.candidates.involves(id)).map(|id| {
+            let body = &self.soft(id).state;
+            let centre = body.velocity();
+            let whirl = body.v.iter().map(|v| (v - centre).norm_squared()).fold(0.0, f64::max).sqrt();
+            self.params.dt * whirl.max(self.approach(id)) / (LARGEST_WAY * body.model.mesh.edge)
+        });
+        (parts.fold(1.0, f64::max).ceil() as u32).next_power_of_two().min(MAX_PARTS)
+    }
+
+    /// Takes the step in equal parts. Prescribed motion is divided as well; drives keep their targets.
+    pub(super) fn step_in_parts(&mut self, parts: u32) -> Result<(), StepFailure> {
+        let dt = self.params.dt;
+        let ends: Vec<Pose> = self.kinematic.iter().map(|frame| frame.next).collect();
+        self.set_dt(dt / f64::from(parts));
+        for part in 0..parts {
+            for (frame, end) in self.kinematic.iter_mut().zip(&ends) {
+                frame.next = frame.pose.lerp_slerp(end, 1.0 / f64::from(parts - part));
+            }
+            if part > 0 {
+                self.count_steps_awake();
+            }
+            self.update_collider_motions();
+            self.find_candidates();
+            self.finish_step()?;
+        }
+        self.kinematic.iter_mut().zip(ends).for_each(|(frame, end)| (frame.pose, frame.next) = (end, end));
+        self.set_dt(dt);
+        Ok(())
+    }
+
+    /// Changes the step length without waking anything.
+    fn set_dt(&mut self, dt: f64) {
+        self.params.dt = dt;
+        self.inputs.0.dt = dt;
+    }
+}
+
+/// Factor of all masses in a step that is not as long as the last one.
+///
+/// With average acceleration, the velocities are those of the middle of the steps, so forces change them for half
+/// of the last step and half of this one: `M (v − v₀) = (dt₀ + dt)/2 f`. As forces act for `dt` in all that the
+/// solver knows, masses change instead: `2 dt / (dt₀ + dt) M (v − v₀) = dt f`.
+pub(super) fn mass_ratio(params: &PhysicsParams, last_dt: f64) -> f64 {
+    if !params.average_acceleration || last_dt == 0.0 {
+        return 1.0;
+    }
+    2.0 * params.dt / (last_dt + params.dt)
+}
+
+/// The coefficients of a body of this model in this step. In a step that is much longer than the last one, average acceleration would take
+/// what the short steps resolved for large amplitudes; implicit Euler damps it.
+pub(super) fn step_coefficients(params: &PhysicsParams, last_dt: f64, model: &FemModel) -> StepCoefficients {
+    let &PhysicsParams { dt, rayleigh_mass, rayleigh_stiffness, average_acceleration, .. } = params;
+    let mass = mass_ratio(params, last_dt) + rayleigh_mass * dt;
+    let beta = model.relaxation.map_or(rayleigh_stiffness, |law| law.dashpot / (1.0 + law.share));
+    let is_longer = last_dt > 0.0 && dt > LONGER * last_dt;
+    if average_acceleration && !is_longer {
+        StepCoefficients::average(dt, mass, beta)
+    } else {
+        StepCoefficients::euler(dt, mass, beta)
+    }
+}
