@@ -49,8 +49,9 @@ pub fn friction(report: &mut Report) {
 pub fn time_step(report: &mut Report) {
     heading(
         "Time step",
-        "Equilibria at 60, 120 and 240 Hz do not depend on it. The step of implicit Euler damps motion as stiffness-proportional damping of \
-         one step does: what moves is damped by β + dt, in the benchmark by 5 ms + 16.7 ms.",
+        "Equilibria at 60, 120 and 240 Hz do not depend on it. The step of implicit Euler, the default, damps motion as stiffness-proportional \
+         damping of one step does: what moves is damped by β + dt, in the benchmark by 5 ms + 16.7 ms. Average acceleration \
+         (`physics.average_acceleration`) adds no damping.",
     );
     header("squeeze | F grip | F hold | D hold %");
     for (name, options, bound) in time_step::cases() {
@@ -103,28 +104,26 @@ fn verdicts() {
 /// Prints what depends on the step: the swing of a lifted body, and the speed of a rolling one.
 fn moving(report: &mut Report) {
     println!(
-        "\nPeak of D over D at rest of a long body (capsule of 40 × 160 mm, 30 kPa) that is lifted by 0.1 m in 0.4 s, at {} Hz. \
-         Speed of a soft ball of 50 mm (30 kPa) after 3 s on a slope, m/s, beside that of a rigid one.\n",
+        "\nPeak of D over D at rest of a long body (capsule of 40 × 160 mm, 30 kPa) that is lifted by 0.1 m in 0.4 s. Speed after an impact over \
+         that before, of a soft ball of 50 mm (30 kPa) that falls by 0.1 m. Speed of such a ball after 3 s on a slope, m/s; a rigid one has 1.01 \
+         and 2.01. At {} Hz, with β = 5 ms.\n",
         time_step::RATES.map(|rate| rate.to_string()).join(", ")
     );
-    header("motion | β = 5 ms | β + dt = 21.7 ms | rigid");
-    let same = |_: f64| time_step::BETA;
-    // Zero without a sign.
-    let shown = |value: f64| format!("{:.3}", (1e3 * value).round() / 1e3 + 0.0);
-    let cells = |found: [f64; 3]| found.map(shown).join(", ");
-    let [with_beta, with_sum] = [&same as &dyn Fn(f64) -> f64, &time_step::compensated]
-        .map(|beta| time_step::RATES.map(|rate| time_step::lifted(rate, beta(rate))));
-    row!("long body, lifted | {} | {} | ", cells(with_beta), cells(with_sum));
-    let changes = |peaks: [f64; 3]| peaks.map(|peak| peak / peaks[2] - 1.0);
-    report.claim("long body, lifted, 60 to 240 Hz with the same β + dt", changes(with_sum), 0.05);
-    report.claim("long body, lifted, 60 to 240 Hz with the same β", changes(with_beta), 0.05);
-    for degrees in [1.0f64, 3.0] {
-        let slope = degrees.to_radians();
-        let [with_beta, with_sum] = [&same as &dyn Fn(f64) -> f64, &time_step::compensated]
-            .map(|beta| time_step::RATES.map(|rate| time_step::rolled(rate, beta(rate), slope)));
-        let rigid = time_step::rolled_rigid(slope);
-        row!("soft ball on {degrees}° | {} | {} | {rigid:.3}", cells(with_beta), cells(with_sum));
-        let what = format!("soft ball on {degrees}°: speed of a rigid one");
-        report.claim(&what, [with_beta[0] / rigid - 1.0], 0.05);
+    header("motion | implicit Euler | average acceleration");
+    let [three, six] = [3f64, 6.0].map(f64::to_radians);
+    let motions: [(&str, &dyn Fn(f64, bool) -> f64, f64); 4] = [
+        ("long body, lifted", &time_step::lifted, 0.03),
+        ("ball, restitution", &time_step::restitution, 0.15),
+        ("ball on 3°", &|rate, average| time_step::rolled(rate, average, three), 0.15),
+        ("ball on 6°", &|rate, average| time_step::rolled(rate, average, six), 0.15),
+    ];
+    for (name, motion, bound) in motions {
+        let [euler, average] =
+            [false, true].map(|average| time_step::RATES.map(|rate| motion(rate, average)));
+        let cells = |found: [f64; 3]| found.map(|value| format!("{value:.3}")).join(", ");
+        row!("{name} | {} | {}", cells(euler), cells(average));
+        let changes = |found: [f64; 3]| found.map(|value| value / found[2] - 1.0);
+        report.claim(&format!("{name}: 60 to 240 Hz, implicit Euler"), changes(euler), bound);
+        report.claim(&format!("{name}: 60 to 240 Hz, average acceleration"), changes(average), bound);
     }
 }

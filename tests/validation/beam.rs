@@ -36,6 +36,31 @@ pub const CASES: [Case; 2] = [
     Case { name: "with 52 g", file: "beam_load52_V2_a", load: 0.052 },
 ];
 
+/// Loss factor with which the damping ratios are those of the recordings.
+const LOSS_FACTOR: f64 = 0.085;
+
+/// Damping of a run, with implicit Euler or, for the loss factor, average acceleration.
+#[derive(Clone, Copy, Debug)]
+pub enum Law {
+    /// β of the benchmark.
+    Default,
+    /// β with which a Kelvin–Voigt material has the recorded damping ratio at the recorded frequency.
+    Dashpot,
+    LossFactor,
+}
+
+impl Law {
+    /// Its β, s.
+    pub fn beta(self, case: &Case) -> Option<f64> {
+        let Swing { frequency, zeta, .. } = case.recorded();
+        match self {
+            Self::Default => Some(5e-3),
+            Self::Dashpot => Some(zeta / (std::f64::consts::PI * frequency)),
+            Self::LossFactor => None,
+        }
+    }
+}
+
 #[derive(Deserialize)]
 struct Recording {
     t_s: Vec<f64>,
@@ -95,22 +120,20 @@ impl Case {
         Swing::new(start, &t_s[release..], &tip_mm[release..])
     }
 
-    /// The β with which a Kelvin–Voigt material has the recorded damping ratio at the recorded frequency, s.
-    pub fn beta(&self) -> f64 {
-        let Swing { frequency, zeta, .. } = self.recorded();
-        zeta / (std::f64::consts::PI * frequency)
-    }
-
-    /// The swing of the simulated beam with `across` voxels across, at `rate` (Hz) and `beta` (s).
-    pub fn simulated(&self, across: usize, rate: f64, beta: f64) -> Swing {
+    /// The swing of the simulated beam with `across` voxels across, at `rate`, Hz.
+    pub fn simulated(&self, across: usize, rate: f64, law: Law) -> Swing {
+        let beta = law.beta(self);
         let params = PhysicsParams {
             dt: 1.0 / rate,
-            rayleigh_stiffness: beta,
+            rayleigh_stiffness: beta.unwrap_or(0.0),
+            average_acceleration: beta.is_none(),
             sleeping: false,
             ..PhysicsParams::default()
         };
+        let loss_factor = if beta.is_none() { LOSS_FACTOR } else { 0.0 };
         let mut world = World::new(params.clone(), -GRAVITY * Vec3::z());
         let silicone = ElasticMaterial::new(263_824.0, 0.499, 1070.0).expect("valid");
+        let silicone = silicone.with_loss_factor(loss_factor).expect("valid");
         let beam = Shape::cuboid(Vec3::new(LENGTH, SIDE, SIDE));
         // The longest edge is ten thirds of the others.
         let beam = SoftBodyBuilder::new(beam, silicone).resolution((10 * across).div_ceil(3));
@@ -158,30 +181,27 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_beam_sags_as_recorded_at_any_step() {
+    fn the_beam_swings_as_recorded_at_any_step() {
         for case in CASES {
-            let (recorded, found) = (case.recorded(), case.simulated(ACROSS, 60.0, case.beta()));
-            let off = found.sag_mm / recorded.sag_mm - 1.0;
-            assert!(off.abs() < 0.05, "{}: {found:?}, recorded {recorded:?}", case.name);
-            let fast = case.simulated(3, 240.0, case.beta()).sag_mm;
-            let slow = case.simulated(3, 60.0, 2.0 * case.beta()).sag_mm;
-            assert!((slow / fast - 1.0).abs() < 1e-4, "{}: {slow} mm at 60 Hz, {fast} at 240", case.name);
+            let recorded = case.recorded();
+            for rate in [60.0, 120.0, 240.0] {
+                let found = case.simulated(3, rate, Law::LossFactor);
+                let off = |value: f64, recorded: f64| (value / recorded - 1.0).abs();
+                let is_close = off(found.sag_mm, recorded.sag_mm) < 0.05
+                    && off(found.frequency, recorded.frequency) < 0.05
+                    && off(found.zeta, recorded.zeta) < 0.2;
+                assert!(is_close, "{} at {rate} Hz: {found:?}, recorded {recorded:?}", case.name);
+            }
         }
     }
 
     #[test]
-    fn the_beam_swings_at_the_recorded_frequency_when_the_step_is_small() {
+    fn implicit_euler_damps_the_beam_too_much_but_lets_it_sag_alike() {
         for case in CASES {
             let recorded = case.recorded();
-            let mut last = f64::INFINITY;
-            for rate in [240.0, 960.0] {
-                let found = case.simulated(3, rate, case.beta());
-                let off = found.frequency / recorded.frequency - 1.0;
-                assert!(off.abs() < 0.05, "{} at {rate} Hz: {found:?}, recorded {recorded:?}", case.name);
-                assert!(found.zeta < last, "{} at {rate} Hz: {found:?}", case.name);
-                last = found.zeta;
-            }
-            assert!(last > recorded.zeta, "{}: {last}, recorded {recorded:?}", case.name);
+            let [slow, fast] = [60.0, 240.0].map(|rate| case.simulated(3, rate, Law::Dashpot));
+            assert!(slow.zeta > fast.zeta && fast.zeta > recorded.zeta, "{}: {slow:?}, {fast:?}", case.name);
+            assert!((slow.sag_mm / fast.sag_mm - 1.0).abs() < 1e-4, "{}: {slow:?}, {fast:?}", case.name);
         }
     }
 }

@@ -84,6 +84,7 @@ pub struct Squeeze {
     /// Static and dynamic, of pads and table.
     pub friction: f64,
     pub beta: f64,
+    pub average_acceleration: bool,
     pub dt: f64,
     pub pad: f64,
     /// Of the pads' centres from mid-height and mid-length, y and z.
@@ -105,6 +106,7 @@ impl Default for Squeeze {
             density: 300.0,
             friction: 1.2,
             beta: 2e-3,
+            average_acceleration: false,
             dt: 1.0 / 60.0,
             pad: 0.022,
             pad_offset: [0.0; 2],
@@ -177,6 +179,7 @@ impl Scene {
         let rest = fem_model(&shape, material, options.resolution, &SampleSpec::default());
         let params = PhysicsParams {
             rayleigh_stiffness: options.beta,
+            average_acceleration: options.average_acceleration,
             dt: options.dt,
             sleeping: false,
             ..PhysicsParams::default()

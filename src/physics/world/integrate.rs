@@ -92,6 +92,58 @@ mod tests {
     }
 
     #[test]
+    fn a_body_in_flight_keeps_its_momenta_with_average_acceleration() {
+        let params = PhysicsParams { average_acceleration: true, ..PhysicsParams::default() };
+        let (mut world, id) = thrown(0.2, params);
+        let start = world.soft(id).state.clone();
+        (0..15).for_each(|_| world.step().expect("a step without contact"));
+        let end = &world.soft(id).state;
+        let change =
+            (angular_momentum(end) - angular_momentum(&start)).norm() / angular_momentum(&start).norm();
+        assert!(change < 1e-11, "{change}");
+        let t = world.time();
+        let centre = start.centre() + start.velocity() * t - Vec3::z() * (0.5 * 9.81 * t * t);
+        assert!((end.centre() - centre).norm() < 1e-12, "{} m, exact {centre}", end.centre());
+    }
+
+    #[test]
+    fn a_body_that_swings_never_gains_energy_with_average_acceleration() {
+        for (beta, rate) in [(0.0, 60.0), (0.0, 240.0), (2e-3, 60.0), (2e-3, 240.0)] {
+            let params = PhysicsParams {
+                dt: 1.0 / rate,
+                rayleigh_stiffness: beta,
+                average_acceleration: true,
+                ..PhysicsParams::default()
+            };
+            let (mut world, id) = thrown(1e-3, params);
+            world.gravity = Vec3::zeros();
+            world.set_soft_motion(id, |_, v| *v = Vec3::zeros());
+            // The energy that average acceleration keeps: elastic at the middle of the last step, and that of the
+            // velocities with the part of (c + e)/2 that is above dt/4. It falls by dt (c − e) wᵀK w with w = (v₀ + v)/2.
+            let above = 2.0 * (f64::max(0.28, 0.5 * rate * beta) - 0.25);
+            let energy = |world: &World| {
+                let state = &world.soft(id).state;
+                let [start, middle, end] = [1.0, 0.5, 0.0].map(|back| {
+                    let mut state = state.clone();
+                    state.x.iter_mut().zip(&state.v).for_each(|(x, v)| *x -= v * (back / rate));
+                    state.update_elastic(0.0);
+                    state.elastic_energy
+                });
+                state.kinetic_energy() + middle + above * (start + end - 2.0 * middle)
+            };
+            world.step().expect("a step without contact");
+            let start = energy(&world);
+            let mut last = start;
+            for _ in 0..(0.1 * rate) as usize {
+                world.step().expect("a step without contact");
+                let now = energy(&world);
+                assert!(now < last + 1e-3 * start, "β {beta}, {rate} Hz: {now} J after {last}");
+                last = now;
+            }
+        }
+    }
+
+    #[test]
     fn mass_proportional_damping_slows_every_motion_of_a_body_in_flight_alike() {
         let (mut world, id) = thrown(0.2, PhysicsParams { rayleigh_mass: 2.5, ..PhysicsParams::default() });
         let start = angular_momentum(&world.soft(id).state);

@@ -66,23 +66,24 @@ impl World {
 ///
 /// With average acceleration, the velocities are those of the middle of the steps, so forces change them for half
 /// of the last step and half of this one: `M (v − v₀) = (dt₀ + dt)/2 f`. As forces act for `dt` in all that the
-/// solver knows, masses change instead: `2 dt / (dt₀ + dt) M (v − v₀) = dt f`.
+/// solver knows, masses change instead: `2 dt / (dt₀ + dt) M (v − v₀) = dt f`. In the first step `dt₀` is 0: the given
+/// velocities are those at the start.
 pub(super) fn mass_ratio(params: &PhysicsParams, last_dt: f64) -> f64 {
-    if !params.average_acceleration || last_dt == 0.0 {
-        return 1.0;
-    }
-    2.0 * params.dt / (last_dt + params.dt)
+    if params.average_acceleration { 2.0 * params.dt / (last_dt + params.dt) } else { 1.0 }
 }
 
-/// The coefficients of a body of this model in this step. In a step that is much longer than the last one, average acceleration would take
-/// what the short steps resolved for large amplitudes; implicit Euler damps it.
+/// The coefficients of a body of this model in a step after one of `last_dt`, s.
+///
+/// In a step that is much longer than the last one, average acceleration would take what the short steps resolved for
+/// large amplitudes; implicit Euler damps it.
 pub(super) fn step_coefficients(params: &PhysicsParams, last_dt: f64, model: &FemModel) -> StepCoefficients {
     let &PhysicsParams { dt, rayleigh_mass, rayleigh_stiffness, average_acceleration, .. } = params;
-    let mass = mass_ratio(params, last_dt) + rayleigh_mass * dt;
+    let ratio = mass_ratio(params, last_dt);
+    let mass = ratio + rayleigh_mass * dt;
     let beta = model.relaxation.map_or(rayleigh_stiffness, |law| law.dashpot / (1.0 + law.share));
-    let is_longer = last_dt > 0.0 && dt > LONGER * last_dt;
-    if average_acceleration && !is_longer {
-        StepCoefficients::average(dt, mass, beta)
+    if average_acceleration && (last_dt == 0.0 || dt <= LONGER * last_dt) {
+        // A step that is longer than the time for which forces act is stable with the masses of the whole step.
+        StepCoefficients::average(dt, mass, ratio.max(1.0), beta)
     } else {
         StepCoefficients::euler(dt, mass, beta)
     }
