@@ -184,6 +184,7 @@
 ---@field grasp_spacing? number Spacing of contact samples where a gripper can reach. Expects metres in 0.0001..0.02. Default 0.00075.
 ---@field collapse_strain? number Compressive strain at which cell walls buckle and a plateau of stress begins; a calibration presses no further. Expects a number in above 0..1.
 ---@field damage_strain? number Compressive strain that leaves a visible crack or set. Expects a number in above 0..1.
+---@field loss_factor? number Loss factor tan δ, which is nearly constant from 1 to 10 Hz; youngs_pa is then the modulus at rest. 0 leaves the damping to the setting physics.rayleigh_stiffness. Expects a number in 0..0.6. Default 0.
 
 ---A free rigid body of uniform density.
 ---@class softvt.Rigid
@@ -689,6 +690,7 @@
 ---@field dt? number Time step. Control runs at 20 Hz independently of it, so it must divide 0.05 s in the benchmark. Limits and grip windows are calibrated with the default. A smaller step damps the motion of soft bodies less; that of the hand does not depend on it. Expects a number in 0.0001..0.05 (s). Default 0.016666666666666666.
 ---@field rayleigh_mass? number Mass-proportional Rayleigh damping of soft bodies (α, as air drag). The paper's engine uses 2.5. Expects a number in 0..1000 (1/s). Default 0.
 ---@field rayleigh_stiffness? number Stiffness-proportional Rayleigh damping of soft bodies (β). Implicit Euler adds its step: motion is damped by β + `dt`, by default 21.7 ms, so that a smaller step damps less. Equilibria do not depend on it. Expects a number in 0..1 (s). Default 0.005.
+---@field average_acceleration? boolean True to integrate soft bodies by average acceleration, which adds no damping, in place of implicit Euler. Expects true or false. Default false.
 ---@field dissipation_time? number Dissipation time scale τ_d of contact springs, s (Castro et al. 2022). A surface that recedes faster than the springs relax is released; the value is small compared with `dt`, so that friction does not lift a sliding surface. Expects a number in 0..1 (s). Default 0.005.
 ---@field rigid_modulus? number Normal contact stiffness per area of nearly rigid colliders, Pa/m: near rigid for Young's moduli up to 1 MPa. Expects a number in above 0..1000000000000 (Pa/m). Default 1e9.
 ---@field shear_ratio? number Tangential over normal contact stiffness. Mindlin (1949) gives 0.5 to 0.8 for solids; creep does not depend on it. Expects a number in above 0..10. Default 0.5.

@@ -31,7 +31,7 @@ pub fn cases() -> [(&'static str, Squeeze, f64); 4] {
 
 /// The squeeze at 60, 120 and 240 Hz.
 pub fn refined(options: &Squeeze) -> [Outcome; 3] {
-    [60.0, 120.0, 240.0].map(|rate| run(&Squeeze { dt: 1.0 / rate, ..*options }))
+    RATES.map(|rate| run(&Squeeze { dt: 1.0 / rate, ..*options }))
 }
 
 /// Peak of D over D at rest of a long soft body that is lifted by 0.1 m in 0.4 s, with or without average acceleration.

@@ -5,7 +5,8 @@
 //! flat. With stiffness `K` at rest, the force is `K (u + g d)`, where the stretch `d` of the branch follows
 //! `ḋ = u̇ − d/τ`, and `β K u̇`. At angular frequency ω, with `r = ω τ`,
 //!
-//! `tan δ = (g r / (1 + r²) + β ω) / (1 + g r² / (1 + r²))` (Ferry, *Viscoelastic Properties of Polymers*, 1980, ch. 3).
+//! `tan δ = (g r / (1 + r²) + β ω) / (1 + g r² / (1 + r²))` (Ferry, *Viscoelastic Properties of Polymers*, 1980, ch.
+//! 3).
 //!
 //! A lossy material is stiffer when it moves fast: by the Kramers–Kronig relations, a flat loss factor adds (2/π) η ln
 //! of the ratio of two frequencies to the stiffness. The stiffness of a material is that at rest.
@@ -56,7 +57,8 @@ impl Default for Branch {
 }
 
 impl Branch {
-    /// Moves the element to displacements `u` at constant velocity within `dt`, s, and returns the stretch, which is exact.
+    /// Moves the element to displacements `u` at constant velocity within `dt`, s, and returns the stretch, which is
+    /// exact.
     pub fn advance(&mut self, u: &[f64; 24], dt: f64) -> &[f64; 24] {
         let ratio = dt / Relaxation::time();
         let decay = (-ratio).exp();

@@ -5,9 +5,10 @@
 //! for `e` on those at the start, `v₀`. `v_r` is the rigid part of `v₀`, on which `K` of a strained body would act as a
 //! brake. Positions follow as `x = x₀ + dt v`, so that contacts act at the end of the step with either scheme:
 //! - implicit Euler: `c = dt + β`, `e = 0`, without `v_r`. A mode of angular frequency ω is damped by ω (dt + β) / 2;
-//! - average acceleration: `c − e = β` and `c + e = dt / 2`. This is Newmark's method (1959) with γ = 1/2 and β = 1/4, with
-//!   the velocities of the middle of the steps. A mode is damped by ω β / 2, whatever the step, and its frequency is
-//!   too low by (ω dt)² / 12. Without contact and damping, the energy of `v` and of the mean of `x₀` and `x` is constant.
+//! - average acceleration: `c − e = β` and `c + e = dt / 2`. This is Newmark's method (1959) with γ = 1/2 and β = 1/4,
+//!   with the velocities of the middle of the steps. A mode is damped by ω β / 2, whatever the step, and its frequency
+//!   is too low by (ω dt)² / 12. Without contact and damping, the energy of `v` and of the mean of `x₀` and `x` is
+//!   constant.
 //!
 //! `K` includes the Maxwell branches of a material with a loss factor.
 //!
@@ -28,11 +29,11 @@ use softvt_geometry::{Mat3, Vec3};
 
 /// Change of an element's rotation (Frobenius norm, about √2 × radians) beyond which the matrix is factored again.
 const STALE_ROTATION: f64 = 0.04;
-/// The same relative to √(μ/λ) of the Lamé parameters: in a nearly incompressible body a small turn is a large change of
-/// stiffness in the directions in which the volume stayed constant.
+/// The same relative to √(μ/λ) of the Lamé parameters: in a nearly incompressible body a small turn is a large change
+/// of stiffness in the directions in which the volume stayed constant.
 const STALE_ROTATION_OF_VOLUME: f64 = 0.22;
-/// Mean of the times `c` and `e` of average acceleration over the step. A quarter is the least for which the step is stable; more is a
-/// margin for a tangent that is not the present one, and lowers frequencies by (ω dt)² / 67.
+/// Mean of the times `c` and `e` of average acceleration over the step. A quarter is the least for which the step is
+/// stable; more is a margin for a tangent that is not the present one, and lowers frequencies by (ω dt)² / 67.
 const AVERAGE: f64 = 0.28;
 /// Least time `c − e` of average acceleration, s: a loss factor of 2 % at 10 Hz, less than that of any soft material.
 const LEAST_DAMPING: f64 = 3e-4;
@@ -67,7 +68,8 @@ impl StepCoefficients {
         Self { dt, mass, end: dt + beta, start: 0.0, rigid: 0.0 }
     }
 
-    /// Average acceleration with stiffness-proportional damping `beta`, s; `c + e` is `factor` times that of equal steps.
+    /// Average acceleration with stiffness-proportional damping `beta`, s; `c + e` is `factor` times that of equal
+    /// steps.
     pub(crate) fn average(dt: f64, mass: f64, factor: f64, beta: f64) -> Self {
         let rigid = beta.max(LEAST_DAMPING);
         let start = (AVERAGE * dt * factor - 0.5 * rigid).max(0.0);
@@ -338,8 +340,8 @@ impl VelocitySystem {
         true
     }
 
-    /// Adds `dt K u` to the momenta `b` of a step (N s), with the factored tangent, for a field `u` (m) of velocity times
-    /// time, given as a function of the velocity and position of a node; all in world axes.
+    /// Adds `dt K u` to the momenta `b` of a step (N s), with the factored tangent, for a field `u` (m) of velocity
+    /// times time, given as a function of the velocity and position of a node; all in world axes.
     pub(crate) fn add_tangent(
         &mut self,
         body: &FemState,

@@ -119,7 +119,8 @@ mod tests {
             world.gravity = Vec3::zeros();
             world.set_soft_motion(id, |_, v| *v = Vec3::zeros());
             // The energy that average acceleration keeps: elastic at the middle of the last step, and that of the
-            // velocities with the part of (c + e)/2 that is above dt/4. It falls by dt (c − e) wᵀK w with w = (v₀ + v)/2.
+            // velocities with the part of (c + e)/2 that is above dt/4. It falls by dt (c − e) wᵀK w with w = (v₀ +
+            // v)/2.
             let above = 2.0 * (f64::max(0.28, 0.5 * rate * beta) - 0.25);
             let energy = |world: &World| {
                 let state = &world.soft(id).state;

@@ -166,6 +166,8 @@ pub struct World {
     step: u64,
     /// Length of the last step or part of one, s; 0 before the first.
     last_dt: f64,
+    /// Largest length of the parts of the last step, s; 0 before the first.
+    part_dt: f64,
     soft: Vec<SoftBody>,
     rigid: Vec<RigidBody>,
     articulations: Vec<Articulation>,

@@ -16,22 +16,30 @@ use softvt_geometry::Pose;
 const LARGEST_WAY: f64 = 0.1;
 /// Largest number of parts.
 const MAX_PARTS: u32 = 32;
+/// Time in which the parts of the steps may double in length, s: a body whose motion turns back is slow for a moment
+/// only.
+const DOUBLING_TIME: f64 = 1.0 / 60.0;
 /// Length of a step over that of the last one above which it is much longer.
 const LONGER: f64 = 1.5;
 
 impl World {
     /// Number of parts into which the step is divided, by its contact candidates.
-    pub(super) fn step_parts(&self) -> u32 {
+    pub(super) fn step_parts(&mut self) -> u32 {
         if !self.params.average_acceleration {
             return 1;
         }
+        let dt = self.params.dt;
         let parts = self.soft_ids().filter(|&id| self.candidates.involves(id)).map(|id| {
             let body = &self.soft(id).state;
             let centre = body.velocity();
             let whirl = body.v.iter().map(|v| (v - centre).norm_squared()).fold(0.0, f64::max).sqrt();
-            self.params.dt * whirl.max(self.approach(id)) / (LARGEST_WAY * body.model.mesh.edge)
+            dt * whirl.max(self.approach(id)) / (LARGEST_WAY * body.model.mesh.edge)
         });
-        (parts.fold(1.0, f64::max).ceil() as u32).next_power_of_two().min(MAX_PARTS)
+        let needed = dt / parts.fold(1.0, f64::max);
+        let allowed = if self.part_dt > 0.0 { self.part_dt * (dt / DOUBLING_TIME).exp2() } else { dt };
+        self.part_dt = needed.min(allowed).max(dt / f64::from(MAX_PARTS));
+        // Rounding must not make a part of a whole step.
+        ((dt / self.part_dt - 1e-9).ceil() as u32).next_power_of_two().min(MAX_PARTS)
     }
 
     /// Takes the step in equal parts. Prescribed motion is divided as well; drives keep their targets.
@@ -39,7 +47,7 @@ impl World {
         let dt = self.params.dt;
         let ends: Vec<Pose> = self.kinematic.iter().map(|frame| frame.next).collect();
         self.set_dt(dt / f64::from(parts));
-        for part in 0..parts {
+        let taken = (0..parts).try_for_each(|part| {
             for (frame, end) in self.kinematic.iter_mut().zip(&ends) {
                 frame.next = frame.pose.lerp_slerp(end, 1.0 / f64::from(parts - part));
             }
@@ -48,11 +56,11 @@ impl World {
             }
             self.update_collider_motions();
             self.find_candidates();
-            self.finish_step()?;
-        }
+            self.finish_step()
+        });
         self.kinematic.iter_mut().zip(ends).for_each(|(frame, end)| (frame.pose, frame.next) = (end, end));
         self.set_dt(dt);
-        Ok(())
+        taken
     }
 
     /// Changes the step length without waking anything.

@@ -25,6 +25,10 @@ cube:paint { material = 1, region = ball:translate(0.2, 0, 0) }
 
 softvt.soft { density = 200, youngs_pa = -1, poisson = 0.3 }
 
+softvt.soft { density = 200, youngs_pa = 1e4, poisson = 0.3, loss_factor = -0.1 }
+
+softvt.soft { density = 200, youngs_pa = 1e4, poisson = 0.3, loss_factor = 2 }
+
 softvt.soft { density = 200, youngs_pa = 1e4, poisson = 0.5 }
 
 softvt.asset { name = 'a', shape = ball, body = softvt.static {}, friction = { static_mu = 0.1 } }
