@@ -69,10 +69,10 @@ const MISSES: &str = "
 - With implicit Euler, what moves is damped by β + dt (*Time step*). A soft ball therefore rolls slower than a rigid one. Besides, the ball of voxels
   has to lift itself from one flat to the next, so that it stands still on small slopes. In contact, the step's tangent also brakes the rotation
   of a strained body: its null space has the rotations of the rest shape. Bodies in flight conserve angular momentum.
-- With implicit Euler, the silicone beam is damped too much for the same reason. With average acceleration its frequency at 60 Hz is 6 % low:
+- With implicit Euler, the silicone beam is damped too much for the same reason. With average acceleration its frequency at 60 Hz is 6 % low alone:
   a mode is too slow by (ω dt)²/12.
 - With average acceleration, a body with ν = 0.499 and without any damping becomes invalid in an impact at 1.4 m/s at 60 Hz; a loss factor
-  of 6 % at 10 Hz (β = 1 ms) suffices. Bounces off stiffer balls (100 kPa) differ by 20 % between 60 and 240 Hz.
+  of 6 % at 10 Hz (β = 1 ms) suffices. Restitution differs by up to a quarter between rates: a bounce is a few parts of a step long.
 - The way of a stopping drawer is short by up to half a step of its speed: positions are first-order in the step.
 - Soft bodies at resolution 6 are too stiff between pads of 24 mm, and where the edges of the pads are between nodes.
 - D depends on the angle between the grasp and the voxels, of resolution 6. When round bodies are turned, D at the force of the tight end

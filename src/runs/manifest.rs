@@ -349,7 +349,7 @@ mod tests {
     use super::*;
     use crate::{sample_manifest, sample_record};
 
-    /// `run.json` of 0.2.1 with every key.
+    /// A `run.json` with every key.
     const ALL_KEYS: &str = include_str!("../../tests/data/run_all_keys.json");
 
     #[test]
