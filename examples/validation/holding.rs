@@ -51,7 +51,7 @@ pub fn time_step(report: &mut Report) {
         "Time step",
         "Equilibria at 60, 120 and 240 Hz do not depend on it. The step of implicit Euler, the default, damps motion as stiffness-proportional \
          damping of one step does: what moves is damped by β + dt, in the benchmark by 5 ms + 16.7 ms. Average acceleration \
-         (`physics.average_acceleration`) adds no damping.",
+         (`physics.average_acceleration`) adds next to none.",
     );
     header("squeeze | F grip | F hold | D hold %");
     for (name, options, bound) in time_step::cases() {

@@ -70,7 +70,7 @@ const MISSES: &str = "
   has to lift itself from one flat to the next, so that it stands still on small slopes. In contact, the step's tangent also brakes the rotation
   of a strained body: its null space has the rotations of the rest shape. Bodies in flight conserve angular momentum.
 - With implicit Euler, the silicone beam is damped too much for the same reason. With average acceleration its frequency at 60 Hz is 6 % low alone:
-  a mode is too slow by (ω dt)²/12.
+  a mode is too slow by (ω dt)²/10.
 - With average acceleration, a body with ν = 0.499 and without any damping becomes invalid in an impact at 1.4 m/s at 60 Hz; a loss factor
   of 6 % at 10 Hz (β = 1 ms) suffices. Restitution differs by up to a quarter between rates: a bounce is a few parts of a step long.
 - The way of a stopping drawer is short by up to half a step of its speed: positions are first-order in the step.

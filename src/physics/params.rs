@@ -21,7 +21,7 @@ softvt_common::settings! {
         /// Stiffness-proportional Rayleigh damping of soft bodies (β). Implicit Euler adds its step: motion is damped
         /// by β + `dt`, by default 21.7 ms, so that a smaller step damps less. Equilibria do not depend on it.
         rayleigh_stiffness: f64 = 5e-3, "s", Range::closed(0.0, 1.0);
-        /// True to integrate soft bodies by average acceleration, which adds no damping, in place of implicit Euler.
+        /// True to integrate soft bodies by average acceleration in place of implicit Euler, whose step damps motion.
         average_acceleration: bool = false;
         /// Dissipation time scale τ_d of contact springs, s (Castro et al. 2022). A surface that recedes faster
         /// than the springs relax is released; the value is small compared with `dt`, so that friction does not

@@ -5,10 +5,10 @@
 //! for `e` on those at the start, `v₀`. `v_r` is the rigid part of `v₀`, on which `K` of a strained body would act as a
 //! brake. Positions follow as `x = x₀ + dt v`, so that contacts act at the end of the step with either scheme:
 //! - implicit Euler: `c = dt + β`, `e = 0`, without `v_r`. A mode of angular frequency ω is damped by ω (dt + β) / 2;
-//! - average acceleration: `c − e = β` and `c + e = dt / 2`. This is Newmark's method (1959) with γ = 1/2 and β = 1/4,
-//!   with the velocities of the middle of the steps. A mode is damped by ω β / 2, whatever the step, and its frequency
-//!   is too low by (ω dt)² / 12. Without contact and damping, the energy of `v` and of the mean of `x₀` and `x` is
-//!   constant.
+//! - average acceleration: `c − e = β` and `c + e = 0.56 dt`, or β if that is larger. This is Newmark's method (1959)
+//!   with γ = 1/2 and β = 1/4, with the velocities of the middle of the steps. A mode is damped by ω β / 2, whatever
+//!   the step, and its frequency is too low by (ω dt)² / 10. Without contact, the energy of `v` and of the mean of `x₀`
+//!   and `x` never grows.
 //!
 //! `K` includes the Maxwell branches of a material with a loss factor.
 //!

@@ -157,7 +157,7 @@ impl World {
                     Some(RigidVelocity::with_momenta(body, undamped))
                 }
             };
-            if c.start > 0.0 {
+            if c.start > 0.0 || (rigid_part.is_none() && c.rigid > 0.0) {
                 let own = RigidVelocity::with_momenta(body, body.momenta());
                 soft.system.add_tangent(
                     body,

@@ -78,7 +78,11 @@ fn force_limit(model: &FemModel, params: &PhysicsParams) -> f64 {
     let constrained = model.material.constrained_modulus();
     let surface = model.samples.len() as f64 * model.spacing * model.spacing;
     let inertial = 2.0 * model.total_mass() * params.max_speed / params.dt;
-    inertial + 2.0 * constrained * (1.0 + params.rayleigh_stiffness / params.dt) * surface
+    let viscous = match model.relaxation {
+        Some(law) => law.share + law.dashpot / params.dt,
+        None => params.rayleigh_stiffness / params.dt,
+    };
+    inertial + 2.0 * constrained * (1.0 + viscous) * surface
 }
 
 #[cfg(test)]
