@@ -7,7 +7,7 @@ use super::{
     element::{self, Stiffness},
     force::{self, ElementCorners, Relaxing, elastic},
     material::ElasticMaterial,
-    relaxation::{Branch, Relaxation},
+    relaxation::{Branch, BranchStep, Relaxation},
     rotation::polar,
 };
 use softvt_geometry::{
@@ -303,7 +303,7 @@ impl FemState {
     /// Updates rotations, forces, energy and volume ratios for the current positions, to which the body has moved
     /// within `dt`, s.
     pub fn update_elastic(&mut self, dt: f64) {
-        let rest = &*self.model;
+        let (rest, step) = (&*self.model, BranchStep::new(dt));
         self.force.fill(Vec3::zeros());
         self.elastic_energy = 0.0;
         self.min_det_f = MinDetF { det_f: f64::INFINITY, element: 0 };
@@ -313,7 +313,7 @@ impl FemState {
             let kind = rest.stiffness_of[e] as usize;
             let (k0, mean_gradients) = (&rest.stiffness[kind], &rest.mean[kind]);
             let relaxing = self.branches.get_mut(e).zip(rest.relaxation);
-            let relaxing = relaxing.map(|(branch, law)| Relaxing { branch, share: law.share, dt });
+            let relaxing = relaxing.map(|(branch, law)| Relaxing { branch, share: law.share, step });
             let mut result = elastic(&x, &rest.corners, mean_gradients, k0, self.rotation[e], relaxing);
             let det_f = force::min_det(&x, rest.mesh.edge);
             if rest.is_checked[e] && det_f < self.min_det_f.det_f {

@@ -1,7 +1,7 @@
 //! Elastic force of one element and its energy.
 
 use super::{
-    relaxation::Branch,
+    relaxation::{Branch, BranchStep},
     rotation::{polar, positive_inverse, stretch_hessian},
 };
 use softvt_geometry::{Mat3, Vec3};
@@ -19,14 +19,14 @@ pub struct ElasticResponse {
     pub energy: f64,
 }
 
-/// An element with a Maxwell branch that moves to its positions within `dt` (s).
+/// An element with a Maxwell branch that moves to its positions within a step.
 pub struct Relaxing<'a> {
-    /// Its branch.
+    /// State of the branch.
     pub branch: &'a mut Branch,
     /// Stiffness of the branch over that of the element.
     pub share: f64,
-    /// Duration of the motion, s.
-    pub dt: f64,
+    /// Effect of the step on the branch.
+    pub step: BranchStep,
 }
 
 /// Force and energy of an element at world corner positions `x`.
@@ -57,8 +57,8 @@ pub fn elastic(
     let work = |p: &[f64; 24], u: &[f64; 24]| 0.5 * p.iter().zip(u).map(|(p, u)| p * u).sum::<f64>();
     let mut p = multiply(k0, &u);
     let mut energy = work(&p, &u);
-    if let Some(Relaxing { branch, share, dt }) = relaxing {
-        let stretch = branch.advance(&u, dt);
+    if let Some(Relaxing { branch, share, step }) = relaxing {
+        let stretch = branch.advance(&u, step);
         let extra = multiply(k0, stretch);
         energy += share * work(&extra, stretch);
         p.iter_mut().zip(extra).for_each(|(p, extra)| *p += share * extra);

@@ -1,4 +1,4 @@
-//! Damping by a loss factor: a Maxwell branch and a dashpot beside the spring of each element.
+//! Damping by a loss factor: a Maxwell branch and a dashpot in parallel with the spring of each element.
 //!
 //! The loss factor η = tan δ of soft solids is nearly constant over a decade of frequency, where a dashpot alone has
 //! η = β ω. A branch of a spring in series with a dashpot has its largest loss at one frequency; together they are
@@ -41,6 +41,24 @@ impl Relaxation {
     }
 }
 
+/// Effect of a time step on every branch, for motion at constant velocity.
+#[derive(Clone, Copy, Debug)]
+pub struct BranchStep {
+    /// Share of the stretch that is left at the end.
+    decay: f64,
+    /// Stretch at the end over the displacement within the step.
+    gain: f64,
+}
+
+impl BranchStep {
+    /// A step of `dt`, s.
+    pub fn new(dt: f64) -> Self {
+        let ratio = dt / Relaxation::time();
+        let decay = (-ratio).exp();
+        Self { decay, gain: if ratio > 0.0 { (1.0 - decay) / ratio } else { 1.0 } }
+    }
+}
+
 /// The branch of one element: 24 displacements of its corners in its rotating frame, m.
 #[derive(Clone, Debug)]
 pub struct Branch {
@@ -57,12 +75,9 @@ impl Default for Branch {
 }
 
 impl Branch {
-    /// Moves the element to displacements `u` at constant velocity within `dt`, s, and returns the stretch, which is
-    /// exact.
-    pub fn advance(&mut self, u: &[f64; 24], dt: f64) -> &[f64; 24] {
-        let ratio = dt / Relaxation::time();
-        let decay = (-ratio).exp();
-        let gain = if ratio > 0.0 { (1.0 - decay) / ratio } else { 1.0 };
+    /// Moves the element to displacements `u` within a step, and returns the exact stretch.
+    pub fn advance(&mut self, u: &[f64; 24], step: BranchStep) -> &[f64; 24] {
+        let BranchStep { decay, gain } = step;
         for ((stretch, last), u) in self.stretch.iter_mut().zip(&mut self.last).zip(u) {
             *stretch = decay * *stretch + gain * (u - *last);
             *last = *u;
@@ -92,15 +107,15 @@ mod tests {
     #[test]
     fn a_branch_that_is_held_forgets_and_one_that_jumps_does_not() {
         let mut branch = Branch::default();
-        assert_eq!(branch.advance(&[1.0; 24], 0.0), &[1.0; 24]);
-        let held = branch.advance(&[1.0; 24], Relaxation::time())[0];
+        assert_eq!(branch.advance(&[1.0; 24], BranchStep::new(0.0)), &[1.0; 24]);
+        let held = branch.advance(&[1.0; 24], BranchStep::new(Relaxation::time()))[0];
         assert!((held - (-1f64).exp()).abs() < 1e-15, "{held}");
         // At constant velocity the stretch tends to velocity times τ, whatever the step.
         for steps in [10, 100] {
             let (mut branch, dt) = (Branch::default(), 10.0 * Relaxation::time() / f64::from(steps));
             let mut stretch = 0.0;
             for step in 1..=steps {
-                stretch = branch.advance(&[f64::from(step) * dt; 24], dt)[3];
+                stretch = branch.advance(&[f64::from(step) * dt; 24], BranchStep::new(dt))[3];
             }
             assert!((stretch / Relaxation::time() - 1.0 + (-10f64).exp()).abs() < 1e-12, "{stretch}");
         }

@@ -99,7 +99,7 @@ pub(crate) struct VelocitySystem {
     work: Vec<f64>,
     /// Largest change of an element's rotation with the same factor.
     stale_rotation: f64,
-    /// Velocities in the frame, and what the tangent makes of them.
+    /// Velocities in the frame, and their products with `A`.
     turned: Vec<Vec3>,
     product: Vec<Vec3>,
     /// Number of factorizations so far.

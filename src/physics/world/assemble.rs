@@ -158,13 +158,15 @@ impl World {
                 }
             };
             if c.start > 0.0 || (rigid_part.is_none() && c.rigid > 0.0) {
-                let own = RigidVelocity::with_momenta(body, body.momenta());
+                let own = || RigidVelocity::with_momenta(body, body.momenta());
+                let rigid = rigid_part.unwrap_or_else(own);
+                let in_flight = rigid_part.is_some();
                 soft.system.add_tangent(
                     body,
                     &c,
-                    |v, x| match &rigid_part {
-                        Some(rigid) => (v - rigid.at(x)) * c.start,
-                        None => v * c.start + own.at(x) * c.rigid,
+                    |v, x| match in_flight {
+                        true => (v - rigid.at(x)) * c.start,
+                        false => v * c.start + rigid.at(x) * c.rigid,
                     },
                     momentum,
                 );
