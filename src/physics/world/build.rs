@@ -81,6 +81,7 @@ impl World {
             name: name.to_owned(),
             state: JointState::at_rest(q),
             tree,
+            last_drives: drives.clone(),
             drives,
             drive_forces: vec![0.0; joints],
             has_gravity,

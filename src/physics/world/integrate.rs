@@ -48,6 +48,7 @@ impl World {
                 let law = drive.map(|drive| drive.constraint(*block, joint, state.q[joint]));
                 *force = law.map_or(0.0, |law| law.force_at(dt, state.v[joint]));
             }
+            articulation.last_drives.clone_from(&articulation.drives);
             state.q.axpy(dt, &state.v, 1.0);
             let joints = articulation.friction.iter_mut().zip(&articulation.tree.links);
             for ((friction, link), q) in joints.zip(state.q.iter()) {

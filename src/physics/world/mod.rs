@@ -221,15 +221,20 @@ impl World {
     /// # Errors
     /// [`StepFailure`]: the state must not be used afterwards.
     pub fn step(&mut self) -> Result<(), StepFailure> {
+        self.begin_step();
+        match self.step_parts() {
+            1 => self.finish_step(),
+            parts => self.step_in_parts(parts),
+        }
+    }
+
+    /// Wakes what is disturbed, and finds what may touch in the whole step.
+    fn begin_step(&mut self) {
         self.step += 1;
         self.update_collider_motions();
         self.wake_disturbed();
         self.count_steps_awake();
         self.find_candidates();
-        match self.step_parts() {
-            1 => self.finish_step(),
-            parts => self.step_in_parts(parts),
-        }
     }
 
     /// Finds what may touch in a step of the present length.

@@ -153,7 +153,7 @@ pub struct JointDrive {
     pub kp: f64,
     /// Damping, N m s/rad or N s/m.
     pub kd: f64,
-    /// Target position, rad or m.
+    /// Target position at the end of the step, rad or m.
     pub target: f64,
     /// Target velocity, rad/s or m/s.
     pub target_velocity: f64,
@@ -195,6 +195,8 @@ pub struct Articulation {
     pub state: JointState,
     pub(super) tree: JointTree,
     pub(super) drives: Vec<Option<JointDrive>>,
+    /// The drives in the last step or part of one.
+    pub(super) last_drives: Vec<Option<JointDrive>>,
     pub(super) drive_forces: Vec<f64>,
     pub(super) has_gravity: bool,
     /// Index of the assembly to which its links belong.
@@ -228,6 +230,16 @@ impl Articulation {
     /// Force of the drive of each joint in the last step, N m or N; 0 for a joint without one.
     pub fn drive_forces(&self) -> &[f64] {
         &self.drive_forces
+    }
+
+    /// Moves the target of each drive by a share of the way from its last place to its end.
+    pub(super) fn move_targets(&mut self, ends: &[Option<JointDrive>], share: f64) {
+        let drives = self.drives.iter_mut().zip(&self.last_drives).zip(ends);
+        for ((drive, last), end) in drives {
+            if let (Some(drive), Some(last), Some(end)) = (drive, last, end) {
+                drive.target = last.target + (end.target - last.target) * share;
+            }
+        }
     }
 
     /// True if any joint has a drive.

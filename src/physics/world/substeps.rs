@@ -42,14 +42,18 @@ impl World {
         ((dt / self.part_dt - 1e-9).ceil() as u32).next_power_of_two().min(MAX_PARTS)
     }
 
-    /// Takes the step in equal parts. Prescribed motion is divided as well; drives keep their targets.
+    /// Takes the step in equal parts. Prescribed frames and the targets of drives move along with them.
     pub(super) fn step_in_parts(&mut self, parts: u32) -> Result<(), StepFailure> {
         let dt = self.params.dt;
         let ends: Vec<Pose> = self.kinematic.iter().map(|frame| frame.next).collect();
+        let drives: Vec<_> = self.articulations.iter().map(|moved| moved.drives.clone()).collect();
         self.set_dt(dt / f64::from(parts));
         let taken = (0..parts).try_for_each(|part| {
             for (frame, end) in self.kinematic.iter_mut().zip(&ends) {
                 frame.next = frame.pose.lerp_slerp(end, 1.0 / f64::from(parts - part));
+            }
+            for (moved, ends) in self.articulations.iter_mut().zip(&drives) {
+                moved.move_targets(ends, 1.0 / f64::from(parts - part));
             }
             if part > 0 {
                 self.count_steps_awake();
@@ -59,6 +63,7 @@ impl World {
             self.finish_step()
         });
         self.kinematic.iter_mut().zip(ends).for_each(|(frame, end)| (frame.pose, frame.next) = (end, end));
+        self.articulations.iter_mut().zip(drives).for_each(|(moved, drives)| moved.drives = drives);
         self.set_dt(dt);
         taken
     }
@@ -96,3 +101,6 @@ pub(super) fn step_coefficients(params: &PhysicsParams, last_dt: f64, model: &Fe
         StepCoefficients::euler(dt, mass, beta)
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,104 @@
+use super::*;
+use crate::{
+    ArticulationId, BodyId, KinematicId, SoftId,
+    contact::Friction,
+    fem::ElasticMaterial,
+    joints::{JointKind, JointTree, Link},
+    world::{JointDrive, KinematicBuilder, RigidBodyBuilder, SoftBodyBuilder},
+};
+use nalgebra::Unit;
+use softvt_geometry::{Mat3, Quat, Vec3, shape::Shape};
+
+const DT: f64 = 1.0 / 60.0;
+const PARTS: u32 = 4;
+
+/// A link of 0.5 kg that slides along an axis.
+fn slider(axis: Unit<Vec3>, friction: f64) -> JointTree {
+    let link = Link {
+        name: "slider".to_owned(),
+        parent: None,
+        placement: Pose::identity(),
+        kind: JointKind::Prismatic(axis),
+        mass: 0.5,
+        com: Vec3::zeros(),
+        inertia: Mat3::identity() * 1e-4,
+        lower: -0.1,
+        upper: 0.1,
+        velocity_limit: f64::INFINITY,
+        effort_limit: 100.0,
+        friction,
+        damping: 0.0,
+    };
+    JointTree { links: vec![link], base_w: Pose::identity() }
+}
+
+fn empty() -> World {
+    let params = PhysicsParams { average_acceleration: true, sleeping: false, ..PhysicsParams::default() };
+    World::new(params, crate::STANDARD_GRAVITY)
+}
+
+/// A soft cube that is held below, pressed by a plate that slides on it and carries a brick, and pushed by a drive.
+struct Press {
+    world: World,
+}
+
+impl Press {
+    const CUBE: SoftId = SoftId::new(0);
+    const PLATE: KinematicId = KinematicId::new(0);
+    const DRIVE: ArticulationId = ArticulationId::new(0);
+
+    fn new() -> Self {
+        let mut world = empty();
+        let (cube, gel) = (Shape::cuboid(Vec3::repeat(0.05)), ElasticMaterial::new(3e4, 0.4, 300.0));
+        let gel = gel.and_then(|gel| gel.with_loss_factor(0.1)).expect("valid");
+        let cube = world.insert(SoftBodyBuilder::new(cube, gel).resolution(4)).expect("a cube");
+        let foot = Shape::cuboid(Vec3::new(0.1, 0.1, 0.01)).translated(Vec3::new(0.0, 0.0, -0.025));
+        world.attach(cube, &foot, BodyId::World).expect("a foot");
+        world.insert(KinematicBuilder::new(Shape::cuboid(Vec3::new(0.2, 0.2, 0.02))).at(0.0, 0.0, 0.035));
+        let brick =
+            RigidBodyBuilder::new(Shape::cuboid(Vec3::repeat(0.02)), 2e3).friction(Friction::new(0.2, 0.1));
+        world.insert(brick.at(0.0, 0.0, 0.055)).expect("a brick");
+        let drive = JointDrive { kp: 500.0, kd: 20.0, target: 0.0, target_velocity: 0.0, effort: 50.0 };
+        let drive =
+            world.add_articulation("piston", slider(Vec3::x_axis(), 0.0), &[0.0], vec![Some(drive)], false);
+        let link = crate::LinkId { articulation: drive, index: 0 };
+        let head = Pose::translation(-0.036, 0.0, 0.0);
+        world.add_shape("head", link, head, &Shape::cuboid(Vec3::repeat(0.02)), Friction::default());
+        Self { world }
+    }
+
+    /// Takes a step of `dt` in parts, by a share of the way of plate and drive to their places at a time.
+    fn step(&mut self, time: f64, share: f64, dt: f64, parts: u32) {
+        let (place, target) = (Vec3::new(3.0 * time * time, 0.0, 0.035 - 0.02 * time), 0.2 * time);
+        let at = self.world.kinematic(Self::PLATE).pose.translation.vector.lerp(&place, share);
+        self.world.move_kinematic(Self::PLATE, Pose::from_parts(at.into(), Quat::identity()));
+        let drives = self.world.articulation_mut(Self::DRIVE).drives_mut();
+        drives.iter_mut().flatten().for_each(|drive| drive.target += share * (target - drive.target));
+        self.world.params.dt = dt;
+        self.world.begin_step();
+        let taken = if parts == 1 { self.world.finish_step() } else { self.world.step_in_parts(parts) };
+        taken.expect("a step that converges");
+    }
+}
+
+/// The press after a divided step, and after the same parts as steps alone, each of which is visited.
+fn divided_and_alone(mut visit: impl FnMut(&Press)) -> [Press; 2] {
+    let mut divided = Press::new();
+    (1..=6).for_each(|step| divided.step(f64::from(step) * DT, 1.0, DT, 1));
+    let (end, mut alone) = (7.0 * DT, Press { world: divided.world.clone() });
+    divided.step(end, 1.0, DT, PARTS);
+    for part in 0..PARTS {
+        alone.step(end, 1.0 / f64::from(PARTS - part), DT / f64::from(PARTS), 1);
+        visit(&alone);
+    }
+    [divided, alone]
+}
+
+#[test]
+fn frames_and_the_targets_of_drives_move_along_lines_in_a_divided_step() {
+    let [divided, alone] = divided_and_alone(|_| {}).map(|press| press.world);
+    let [found, expected] = [&divided, &alone].map(|world| world.articulation(Press::DRIVE).state.q[0]);
+    assert!((found - expected).abs() < 1e-9, "drive: {found} m, parts {expected} m");
+    let [found, expected] = [&divided, &alone].map(|world| world.soft(Press::CUBE).state.centre());
+    assert!((found - expected).norm() < 1e-9, "cube: {found} m, parts {expected} m");
+}
