@@ -107,6 +107,11 @@ impl Attachment {
         self.bonds.iter().map(|bond| bond.node as usize)
     }
 
+    /// True if its soft body was awake in the last step.
+    pub(super) fn is_awake(&self) -> bool {
+        !self.points.is_empty()
+    }
+
     /// True if it bonds this soft body to this other body.
     pub(super) fn is_between(&self, soft: SoftId, to: BodyId) -> bool {
         self.soft == soft && self.to == to
@@ -264,7 +269,7 @@ impl World {
 
     /// Sums up the solved forces of the bonds.
     pub(super) fn record_bonds(&mut self) {
-        for attachment in self.attachments.iter_mut().filter(|attachment| !attachment.points.is_empty()) {
+        for attachment in self.attachments.iter_mut().filter(|attachment| attachment.is_awake()) {
             let points = self.problem.points[attachment.points.clone()].iter();
             let impulses = points.map(|point| point.normal * point.normal_impulse + point.shear_impulse);
             attachment.force_w = impulses.sum::<Vec3>() / self.params.dt;

@@ -47,6 +47,7 @@ mod sleep;
 mod snapshot;
 mod soft_contacts;
 mod state;
+mod step_means;
 mod substeps;
 
 use crate::{
@@ -184,12 +185,13 @@ pub struct World {
     candidates: soft_contacts::Candidates,
     rows: Vec<soft_contacts::SoftRow>,
     rigid_contacts: rigid_contacts::RigidContacts,
+    means: step_means::StepMeans,
     moving: Vec<GroupedAabb>,
     // State of sleep.
     /// Parameters and gravity of the last step.
     inputs: (PhysicsParams, Vec3),
     /// Points of colliders whose two sides rest, of the step in which the second fell asleep.
-    resting: Vec<(ColliderId, PatchPoint)>,
+    resting: Vec<snapshot::ColliderPoint>,
 }
 
 impl World {
@@ -235,6 +237,7 @@ impl World {
         self.wake_disturbed();
         self.count_steps_awake();
         self.find_candidates();
+        self.means.clear();
     }
 
     /// Finds what may touch in a step of the present length.
@@ -270,7 +273,7 @@ impl World {
         self.step as f64 * self.params.dt
     }
 
-    /// Iteration counts of the last solve.
+    /// Iteration counts of the last step.
     pub fn solver_stats(&self) -> SolverStats {
         self.stats
     }

@@ -18,9 +18,9 @@ use softvt_geometry::{Aabb, GroupedAabb, Vec3, convex::Placed, overlapping_pairs
 
 /// Identity of a contact point of two colliders from step to step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-struct PointKey {
-    a: ColliderId,
-    b: ColliderId,
+pub(super) struct PointKey {
+    pub a: ColliderId,
+    pub b: ColliderId,
     pair: ContactPairId,
     feature: u32,
 }
@@ -81,8 +81,7 @@ pub(super) struct RigidContacts {
 
 /// A solved point of two colliders that presses.
 pub(super) struct PressingPoint<'a> {
-    pub a: ColliderId,
-    pub b: ColliderId,
+    pub key: PointKey,
     /// Distance slipped before this step, m.
     pub slip_distance: f64,
     pub point: &'a ContactPoint,
@@ -245,8 +244,7 @@ impl RigidContacts {
     ) -> impl Iterator<Item = PressingPoint<'a>> {
         let pressing = self.rows.iter().zip(solved).filter(|(_, point)| point.normal_impulse > 0.0);
         pressing.map(|(RigidRow { key, slip_distance }, point)| PressingPoint {
-            a: key.a,
-            b: key.b,
+            key: *key,
             slip_distance: *slip_distance,
             point,
         })

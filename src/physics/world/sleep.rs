@@ -49,7 +49,7 @@ impl World {
         self.moving = moving;
         self.wake_assemblies();
         let mut resting = std::mem::take(&mut self.resting);
-        resting.retain(|(collider, point)| self.are_resting(*collider, point.partner));
+        resting.retain(|own| self.are_resting(own.collider, own.point.partner));
         self.resting = resting;
     }
 

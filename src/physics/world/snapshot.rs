@@ -1,6 +1,8 @@
 //! Observation of a world: copies of its state, contact forces and energies.
 
-use super::{BodyContact, World, contact_points::SpringUpdate, state::ContactSummary};
+use super::{
+    BodyContact, World, contact_points::SpringUpdate, rigid_contacts::PointKey, state::ContactSummary,
+};
 use crate::{
     ids::{BodyId, ColliderId, ContactPartner, LinkId, RigidId, SoftId},
     joints::{kinetic_energy, potential_energy},
@@ -62,7 +64,7 @@ pub struct SampleSupport {
     pub weights: [f64; 8],
 }
 
-/// One point of a contact patch.
+/// One point of a contact patch. Tractions are means over the step.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PatchPoint {
     /// The surface that the collider touches.
@@ -85,6 +87,15 @@ pub struct PatchPoint {
     pub mu: f64,
     /// True if friction is at its bound.
     pub is_slipping: bool,
+}
+
+/// A point of the patch of a collider.
+#[derive(Clone, Debug)]
+pub(super) struct ColliderPoint {
+    pub collider: ColliderId,
+    /// Its identity from step to step, if the other side is a collider.
+    pub key: Option<PointKey>,
+    pub point: PatchPoint,
 }
 
 /// Energies of a world, J.
@@ -132,13 +143,15 @@ impl World {
 
     /// Contact patch of a collider in the last step; with a body that sleeps, in the last step in which it was awake.
     pub fn patch(&self, collider: ColliderId) -> ContactPatch {
-        let mut points =
-            self.solved_points(|own, partner| own == collider && !self.are_resting(own, partner));
-        let rests = |(own, point): &&(ColliderId, PatchPoint)| {
-            *own == collider && self.are_resting(*own, point.partner)
+        let mut points = match self.means.points() {
+            [] => self.solved_points(|own, _| own == collider),
+            means => means.iter().filter(|own| own.collider == collider).cloned().collect(),
         };
+        points.retain(|own| !self.are_resting(collider, own.point.partner));
+        let rests =
+            |own: &&ColliderPoint| own.collider == collider && self.are_resting(collider, own.point.partner);
         points.extend(self.resting.iter().filter(rests).cloned());
-        ContactPatch { collider, points: points.into_iter().map(|(_, point)| point).collect() }
+        ContactPatch { collider, points: points.into_iter().map(|own| own.point).collect() }
     }
 
     /// True if neither side of a contact is solved for.
@@ -154,7 +167,7 @@ impl World {
     pub(super) fn solved_points(
         &self,
         wanted: impl Fn(ColliderId, ContactPartner) -> bool,
-    ) -> Vec<(ColliderId, PatchPoint)> {
+    ) -> Vec<ColliderPoint> {
         let (soft, solid) = self.problem.points.split_at(self.rows.len().min(self.problem.points.len()));
         let mut points = Vec::new();
         for (row, point) in self.rows.iter().zip(soft) {
@@ -163,15 +176,18 @@ impl World {
                 let model = &self.soft(row.soft).state.model;
                 let area = model.samples[row.sample].surface.area * row.coverage;
                 let face = SampleSupport { group: row.group, weights: point.weights_a };
-                points.push((own, self.patch_point(own, partner, Some(face), point, 1.0, area)));
+                let point = self.patch_point(own, partner, Some(face), point, 1.0, area);
+                points.push(ColliderPoint { collider: own, key: None, point });
             }
         }
         for solved in self.rigid_contacts.pressing(solid) {
-            for (own, other, sign) in [(solved.a, solved.b, -1.0), (solved.b, solved.a, 1.0)] {
+            let PointKey { a, b, .. } = solved.key;
+            for (own, other, sign) in [(a, b, -1.0), (b, a, 1.0)] {
                 if wanted(own, other.into()) {
-                    let [a, b] = [solved.a, solved.b].map(|id| &self.collider(id).stiffness);
+                    let [a, b] = [a, b].map(|id| &self.collider(id).stiffness);
                     let area = solved.point.stiffness / a.in_series(b).normal;
-                    points.push((own, self.patch_point(own, other.into(), None, solved.point, sign, area)));
+                    let point = self.patch_point(own, other.into(), None, solved.point, sign, area);
+                    points.push(ColliderPoint { collider: own, key: Some(solved.key), point });
                 }
             }
         }
@@ -189,7 +205,7 @@ impl World {
         area: f64,
     ) -> PatchPoint {
         let pose = &self.motions[collider.index()].pose;
-        let share = self.params.dt * area;
+        let share = self.problem.dt * area;
         PatchPoint {
             partner,
             face,
@@ -261,7 +277,8 @@ impl World {
             record(other, row.soft.into(), on(-1.0));
         }
         for solved in rigid_contacts.pressing(&problem.points[rows.len()..]) {
-            for (side, other, sign) in [(solved.a, solved.b, 1.0), (solved.b, solved.a, -1.0)] {
+            let PointKey { a, b, .. } = solved.key;
+            for (side, other, sign) in [(a, b, 1.0), (b, a, -1.0)] {
                 let point = SidePoint { point: solved.point, slip_distance: solved.slip_distance, sign, dt };
                 record(colliders[side.index()].parent, other.into(), point);
             }

@@ -13,7 +13,8 @@ use crate::{
 };
 use softvt_geometry::{Pose, Vec3};
 
-/// Contact of one body with one partner, summed over the contact points.
+/// Contact of one body with one partner, summed over the contact points. Forces and speed are means over the step; the
+/// rest is that of the last part in which the two touched, if the step was divided.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ContactSummary {
     /// Number of points that press.
@@ -29,7 +30,7 @@ pub struct ContactSummary {
     /// Force-weighted mean distance slipped since first contact, m. It changes as well when points join
     /// or leave the patch.
     pub slip_distance: f64,
-    /// Force-weighted mean speed at which the points slid in the last step, m/s.
+    /// Force-weighted mean distance that the points slid in the last step over its length, m/s.
     pub slip_speed: f64,
 }
 
@@ -50,6 +51,17 @@ impl ContactSummary {
             slip_distance: mean(self.slip_distance, other.slip_distance),
             slip_speed: mean(self.slip_speed, other.slip_speed),
         }
+    }
+
+    /// Adds a part of a step, which lasts for a share of it.
+    pub(super) fn add_part(&mut self, part: &Self, share: f64) {
+        *self = Self {
+            normal_force: self.normal_force + share * part.normal_force,
+            force_w: self.force_w + share * part.force_w,
+            friction_capacity: self.friction_capacity + share * part.friction_capacity,
+            slip_speed: self.slip_speed + share * part.slip_speed,
+            ..*part
+        };
     }
 
     /// Shear force, N; exact if all normals of the patch agree.

@@ -60,12 +60,16 @@ impl World {
             }
             self.update_collider_motions();
             self.find_candidates();
-            self.finish_step()
+            self.finish_step()?;
+            self.add_part(1.0 / f64::from(parts));
+            Ok(())
         });
         self.kinematic.iter_mut().zip(ends).for_each(|(frame, end)| (frame.pose, frame.next) = (end, end));
         self.articulations.iter_mut().zip(drives).for_each(|(moved, drives)| moved.drives = drives);
         self.set_dt(dt);
-        taken
+        taken?;
+        self.report_means();
+        Ok(())
     }
 
     /// Changes the step length without waking anything.

@@ -1,6 +1,6 @@
 use super::*;
 use crate::{
-    ArticulationId, BodyId, KinematicId, SoftId,
+    ArticulationId, AttachmentId, BodyId, ColliderId, KinematicId, RigidId, SoftId,
     contact::Friction,
     fem::ElasticMaterial,
     joints::{JointKind, JointTree, Link},
@@ -44,8 +44,10 @@ struct Press {
 
 impl Press {
     const CUBE: SoftId = SoftId::new(0);
+    const BRICK: RigidId = RigidId::new(0);
     const PLATE: KinematicId = KinematicId::new(0);
     const DRIVE: ArticulationId = ArticulationId::new(0);
+    const HOLD: AttachmentId = AttachmentId::new(0);
 
     fn new() -> Self {
         let mut world = empty();
@@ -79,6 +81,23 @@ impl Press {
         let taken = if parts == 1 { self.world.finish_step() } else { self.world.step_in_parts(parts) };
         taken.expect("a step that converges");
     }
+
+    /// Newton steps, forces and speeds of the last step.
+    fn report(&self) -> Vec<f64> {
+        let (world, plate) = (&self.world, ColliderId::new(0));
+        let patch = world.patch(plate);
+        let pressed =
+            patch.points.iter().map(|point| (point.normal_p * point.pressure + point.shear_p) * point.area);
+        let pressed = pressed.sum::<Vec3>();
+        let touched = [world.contact(Self::CUBE, plate), world.contact(Self::BRICK, plate)];
+        let touched = touched
+            .iter()
+            .flat_map(|on| [on.normal_force, on.force_w.x, on.friction_capacity, on.slip_speed]);
+        let held = world.attachment(Self::HOLD).force_w;
+        let newton = f64::from(world.solver_stats().newton_steps);
+        let drive = world.articulation(Self::DRIVE).drive_forces()[0];
+        std::iter::once(newton).chain(touched).chain([pressed.x, pressed.z, held.x, held.z, drive]).collect()
+    }
 }
 
 /// The press after a divided step, and after the same parts as steps alone, each of which is visited.
@@ -101,4 +120,20 @@ fn frames_and_the_targets_of_drives_move_along_lines_in_a_divided_step() {
     assert!((found - expected).abs() < 1e-9, "drive: {found} m, parts {expected} m");
     let [found, expected] = [&divided, &alone].map(|world| world.soft(Press::CUBE).state.centre());
     assert!((found - expected).norm() < 1e-9, "cube: {found} m, parts {expected} m");
+}
+
+#[test]
+fn a_divided_step_reports_the_means_of_its_parts() {
+    let mut sums = Vec::new();
+    let [divided, _] = divided_and_alone(|part| {
+        let found = part.report();
+        sums.resize(found.len(), 0.0);
+        sums.iter_mut().zip(found).for_each(|(sum, found)| *sum += found);
+    });
+    // All are means but the number of Newton steps, the first.
+    for (index, (found, sum)) in divided.report().into_iter().zip(sums).enumerate() {
+        let expected = if index == 0 { sum } else { sum / f64::from(PARTS) };
+        let is_near = (found - expected).abs() < 1e-6 * expected.abs();
+        assert!(is_near && expected != 0.0, "{index}: {found}, parts {expected}");
+    }
 }
