@@ -47,7 +47,7 @@ impl World {
         let dt = self.params.dt;
         let ends: Vec<Pose> = self.kinematic.iter().map(|frame| frame.next).collect();
         let drives: Vec<_> = self.articulations.iter().map(|moved| moved.drives.clone()).collect();
-        self.set_dt(dt / f64::from(parts));
+        self.params.dt = dt / f64::from(parts);
         let taken = (0..parts).try_for_each(|part| {
             for (frame, end) in self.kinematic.iter_mut().zip(&ends) {
                 frame.next = frame.pose.lerp_slerp(end, 1.0 / f64::from(parts - part));
@@ -55,27 +55,22 @@ impl World {
             for (moved, ends) in self.articulations.iter_mut().zip(&drives) {
                 moved.move_targets(ends, 1.0 / f64::from(parts - part));
             }
+            // What may touch in the whole step includes what may in its first part.
             if part > 0 {
                 self.count_steps_awake();
+                self.update_collider_motions();
+                self.find_candidates();
             }
-            self.update_collider_motions();
-            self.find_candidates();
             self.finish_step()?;
             self.add_part(1.0 / f64::from(parts));
             Ok(())
         });
         self.kinematic.iter_mut().zip(ends).for_each(|(frame, end)| (frame.pose, frame.next) = (end, end));
         self.articulations.iter_mut().zip(drives).for_each(|(moved, drives)| moved.drives = drives);
-        self.set_dt(dt);
+        self.params.dt = dt;
         taken?;
         self.report_means();
         Ok(())
-    }
-
-    /// Changes the step length without waking anything.
-    fn set_dt(&mut self, dt: f64) {
-        self.params.dt = dt;
-        self.inputs.0.dt = dt;
     }
 }
 

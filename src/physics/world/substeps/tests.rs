@@ -137,3 +137,12 @@ fn a_divided_step_reports_the_means_of_its_parts() {
         assert!(is_near && expected != 0.0, "{index}: {found}, parts {expected}");
     }
 }
+
+#[test]
+fn the_first_part_of_a_step_takes_the_candidates_that_divided_it() {
+    let mut world = Press::new().world;
+    world.begin_step();
+    world.candidates = Default::default();
+    world.step_in_parts(1).expect("a step that converges");
+    assert!(world.rows.is_empty(), "found again");
+}
