@@ -111,8 +111,8 @@ pub(crate) struct ContactPoint {
     pub mu: f64,
     /// True if the two sides are bonded: the point also pulls, and its tangential spring has no bound.
     pub is_bonded: bool,
-    /// Normal impulse of the previous pass, N s; the friction bound is `mu` times it. At the start of a solve that
-    /// of the last step.
+    /// Normal impulse of the previous pass, N s; the friction bound is `mu` times it. At the start of a solve an
+    /// estimate from the last step.
     pub previous_normal_impulse: f64,
     /// Result: normal impulse, N s.
     pub normal_impulse: f64,

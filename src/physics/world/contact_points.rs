@@ -19,7 +19,7 @@ pub(super) struct SurfaceContact {
     pub area: f64,
     /// Stretch of the tangential spring, m, world; its part along the normal is ignored.
     pub stretch: Vec3,
-    /// Normal impulse of the last step, N s.
+    /// Normal impulse of the last step if it had been as long as this one, N s.
     pub previous_normal_impulse: f64,
     /// True if the two surfaces slide on each other.
     pub is_sliding: bool,

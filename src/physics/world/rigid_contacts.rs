@@ -186,7 +186,7 @@ impl World {
             gap: point.gap,
             area: point.area,
             stretch: motion.pose.rotation * state.stretch,
-            previous_normal_impulse: state.normal_impulse,
+            previous_normal_impulse: state.normal_impulse * self.growth(),
             is_sliding: state.is_sliding,
         };
         let drift = if is_b_known { motion.velocity(&point.position_w) } else { Vec3::zeros() };

@@ -212,7 +212,7 @@ impl World {
             gap: candidate.gap,
             area: sample.surface.area * candidate.coverage,
             stretch: candidate.p - anchor_w,
-            previous_normal_impulse: record.normal_impulse,
+            previous_normal_impulse: record.normal_impulse * self.growth(),
             is_sliding: record.is_sliding,
         };
         let (friction, stiffness) =
@@ -276,7 +276,7 @@ impl World {
             gap: contact.gap,
             area: data.surface.area * contact.coverage * share,
             stretch,
-            previous_normal_impulse: record.normal_impulse,
+            previous_normal_impulse: record.normal_impulse * self.growth(),
             is_sliding: record.is_sliding,
         };
         let point = ContactPoint {

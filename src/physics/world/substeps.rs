@@ -74,6 +74,13 @@ impl World {
     }
 }
 
+impl World {
+    /// Length of this step over that of the last one, 1 for the first: the growth of an impulse if its force stays.
+    pub(super) fn growth(&self) -> f64 {
+        if self.last_dt > 0.0 { self.params.dt / self.last_dt } else { 1.0 }
+    }
+}
+
 /// Factor of all masses in a step that is not as long as the last one.
 ///
 /// With average acceleration, the velocities are those of the middle of the steps, so forces change them for half

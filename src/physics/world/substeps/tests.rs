@@ -146,3 +146,16 @@ fn the_first_part_of_a_step_takes_the_candidates_that_divided_it() {
     world.step_in_parts(1).expect("a step that converges");
     assert!(world.rows.is_empty(), "found again");
 }
+
+#[test]
+fn the_estimate_of_a_normal_impulse_grows_with_the_step() {
+    let mut world = Press::new().world;
+    (0..30).for_each(|_| world.step().expect("a step that converges"));
+    let contacts = world.problem.points.iter().filter(|point| !point.is_bonded);
+    let last: f64 = contacts.map(|point| point.normal_impulse).sum();
+    world.params.dt = 0.25 * DT;
+    world.begin_step();
+    world.assemble().expect("a positive definite system");
+    let estimate: f64 = world.problem.points.iter().map(|point| point.previous_normal_impulse).sum();
+    assert!((estimate / last - 0.25).abs() < 1e-12, "{estimate} N s after {last} N s");
+}
