@@ -239,6 +239,7 @@ impl World {
     fn add_articulation_blocks(&mut self) {
         self.blocks.articulations.clear();
         let (dt, mass_ratio) = (self.params.dt, mass_ratio(&self.params, self.last_dt));
+        let share = self.part_share();
         for (index, articulation) in self.articulations.iter_mut().enumerate() {
             let root = LinkId { articulation: ArticulationId::new(index), index: 0 };
             if articulation.sleep.is_asleep {
@@ -253,9 +254,11 @@ impl World {
             let rhs = &mass * &state.v - bias * dt;
             let block = self.problem.blocks.len();
             for i in 0..n {
-                mass[(i, i)] += dt * articulation.tree.links[i].damping;
-                articulation.friction[i].stiffness = FIRM_RATE * mass[(i, i)] / (dt * dt);
-                let constraints = joint_constraints(articulation, i, block, mass[(i, i)], dt);
+                let damping = dt * articulation.tree.links[i].damping;
+                let stiffness = FIRM_RATE * (mass[(i, i)] / mass_ratio + damping) / (dt * dt);
+                articulation.friction[i].set_stiffness(stiffness, dt, articulation.state.q[i]);
+                mass[(i, i)] += damping;
+                let constraints = joint_constraints(articulation, i, block, mass[(i, i)], dt, share);
                 self.problem.constraints.extend(constraints);
             }
             self.blocks.articulations.push(Some(block));
@@ -342,13 +345,15 @@ impl World {
     }
 }
 
-/// Drive, stops, speed limit and dry friction of one joint; `inertia` is its diagonal entry of the mass matrix.
+/// Drive, stops, speed limit and dry friction of one joint; `inertia` is its diagonal entry of the mass matrix, and
+/// `dt` a share of the whole step.
 fn joint_constraints(
     articulation: &Articulation,
     joint: usize,
     block: usize,
     inertia: f64,
     dt: f64,
+    share: f64,
 ) -> impl Iterator<Item = ScalarConstraint> + use<> {
     let link = &articulation.tree.links[joint];
     let (q, v) = (articulation.state.q[joint], articulation.state.v[joint]);
@@ -363,14 +368,16 @@ fn joint_constraints(
     let is_near = |distance: f64| {
         drive.is_none() || distance < 2.0 * v.abs() * dt + 0.02 * (link.upper - link.lower).min(1.0)
     };
+    // A joint that a load has pressed beyond its stop returns within the time of a whole step: within that of a part,
+    // it would be thrown.
     let lower = is_near(q - link.lower).then_some(ScalarConstraint {
         stiffness: k,
-        error: link.lower - q,
+        error: (link.lower - q).min(share * (link.lower - q)),
         ..pushes_up
     });
     let upper = is_near(link.upper - q).then_some(ScalarConstraint {
         stiffness: k,
-        error: link.upper - q,
+        error: (link.upper - q).max(share * (link.upper - q)),
         ..pushes_down
     });
     let limit = link.velocity_limit;

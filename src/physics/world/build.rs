@@ -87,7 +87,7 @@ impl World {
             has_gravity,
             assembly: None,
             sleep: SleepState::default(),
-            friction: q.iter().map(|&anchor| JointFriction { anchor, stiffness: 0.0 }).collect(),
+            friction: q.iter().map(|&anchor| JointFriction { anchor, stiffness: 0.0, dt: 0.0 }).collect(),
             poses,
         });
         ArticulationId::new(self.articulations.len() - 1)

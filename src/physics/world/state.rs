@@ -196,6 +196,19 @@ pub(super) struct JointFriction {
     pub anchor: f64,
     /// Stiffness in the last step, N m/rad or N/m.
     pub stiffness: f64,
+    /// Length of that step, s; 0 before the first.
+    pub dt: f64,
+}
+
+impl JointFriction {
+    /// Sets the stiffness for a step of `dt`. Where the length of steps changes, the spring of a joint at `q` keeps its
+    /// force.
+    pub(super) fn set_stiffness(&mut self, stiffness: f64, dt: f64, q: f64) {
+        if self.dt > 0.0 && self.dt != dt {
+            self.anchor = q + (self.anchor - q) * (self.stiffness / stiffness);
+        }
+        (self.stiffness, self.dt) = (stiffness, dt);
+    }
 }
 
 /// An articulation of a [`World`](super::World): a tree of links and joints with a fixed base.

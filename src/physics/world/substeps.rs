@@ -75,6 +75,11 @@ impl World {
 }
 
 impl World {
+    /// Share of the whole step for which the present part of it lasts.
+    pub(super) fn part_share(&self) -> f64 {
+        self.params.dt / self.inputs.0.dt
+    }
+
     /// Length of this step over that of the last one, 1 for the first: the growth of an impulse if its force stays.
     pub(super) fn growth(&self) -> f64 {
         if self.last_dt > 0.0 { self.params.dt / self.last_dt } else { 1.0 }

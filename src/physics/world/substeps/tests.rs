@@ -159,3 +159,38 @@ fn the_estimate_of_a_normal_impulse_grows_with_the_step() {
     let estimate: f64 = world.problem.points.iter().map(|point| point.previous_normal_impulse).sum();
     assert!((estimate / last - 0.25).abs() < 1e-12, "{estimate} N s after {last} N s");
 }
+
+#[test]
+fn the_friction_of_a_joint_holds_its_load_through_changes_of_the_step() {
+    for axis in [Vec3::z_axis(), -Vec3::z_axis()] {
+        let mut world = empty();
+        let slider = world.add_articulation("slider", slider(axis, 8.0), &[0.0], vec![None], true);
+        (0..20).for_each(|_| world.step().expect("a step that converges"));
+        let start = world.articulation(slider).state.q[0];
+        assert!(start != 0.0, "the spring is stretched by the load");
+        for parts in [8, 8, 1, 32, 2, 1, 1] {
+            world.begin_step();
+            world.step_in_parts(parts).expect("a step that converges");
+            let q = world.articulation(slider).state.q[0];
+            assert!(
+                (q - start).abs() < 1e-6 * start.abs(),
+                "{parts} parts: moved by {} of {start} m",
+                q - start
+            );
+        }
+    }
+}
+
+#[test]
+fn a_stop_that_is_pressed_does_not_throw_the_joint_back_in_short_parts() {
+    let mut world = empty();
+    let slider = world.add_articulation("slider", slider(Vec3::z_axis(), 0.0), &[-0.1], vec![None], true);
+    (0..60).for_each(|_| world.step().expect("a step that converges"));
+    for parts in [32, 32, 1, 8] {
+        world.begin_step();
+        world.step_in_parts(parts).expect("a step that converges");
+        // Of the 0.16 m/s by which gravity changes the speed of a free joint in a step.
+        let speed = world.articulation(slider).state.v[0];
+        assert!(speed.abs() < 0.02 * 9.81 * DT, "{parts} parts: {speed} m/s");
+    }
+}
