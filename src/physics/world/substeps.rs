@@ -36,7 +36,7 @@ impl World {
             dt * whirl.max(self.approach(id)) / (LARGEST_WAY * body.model.mesh.edge)
         });
         let needed = dt / parts.fold(1.0, f64::max);
-        let allowed = if self.part_dt > 0.0 { self.part_dt * (dt / DOUBLING_TIME).exp2() } else { dt };
+        let allowed = if self.part_dt > 0.0 { self.part_dt * libm::exp2(dt / DOUBLING_TIME) } else { dt };
         self.part_dt = needed.min(allowed).max(dt / f64::from(MAX_PARTS));
         // Rounding must not make a part of a whole step.
         ((dt / self.part_dt - 1e-9).ceil() as u32).next_power_of_two().min(MAX_PARTS)
