@@ -100,8 +100,11 @@ impl FemModel {
     /// Estimated memory of a body after its first step, bytes.
     pub fn bytes(&self) -> usize {
         let (nodes, elements) = (self.mesh.nodes.len(), self.mesh.elements.len());
-        let own = nodes * (size_of::<f64>() + 4 * size_of::<Vec3>())
+        let branches = self.relaxation.map_or(0, |_| elements * size_of::<Branch>());
+        // Six vectors per node: position at rest and now, velocity, force, and two for a product with the tangent.
+        let own = nodes * (size_of::<f64>() + 6 * size_of::<Vec3>())
             + elements * (size_of::<[u32; 8]>() + size_of::<OccupancyMask>() + 2 * size_of::<Mat3>())
+            + branches
             + self.samples.len() * size_of::<ContactSample>()
             + self.stiffness.len() * size_of::<Stiffness>();
         own + Self::estimated_bytes(nodes) as usize
@@ -381,5 +384,23 @@ impl FemState {
     /// Largest node speed, m/s.
     pub fn max_speed(&self) -> f64 {
         self.v.iter().map(|v| v.norm_squared()).fold(0.0, f64::max).sqrt()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_branches_of_a_material_with_a_loss_factor_count_as_memory() {
+        let bytes = |loss_factor: f64| {
+            let material =
+                ElasticMaterial::new(3e4, 0.4, 300.0).and_then(|own| own.with_loss_factor(loss_factor));
+            let (cube, material) = (Shape::cuboid(Vec3::repeat(0.05)), material.expect("valid"));
+            let model = FemModel::from_shape(&cube, 1.25e-4, material, 4, &SampleSpec::default());
+            model.expect("a cube").bytes()
+        };
+        // 64 elements with the stretch and the last displacement of 8 corners.
+        assert_eq!(bytes(0.1) - bytes(0.0), 64 * 2 * 8 * 3 * 8);
     }
 }
