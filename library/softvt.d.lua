@@ -327,6 +327,7 @@
 ---@field dt? number Time step: the setting physics.dt, with its default and range. Expects seconds.
 ---@field rayleigh_mass? number Mass-proportional Rayleigh damping: the setting physics.rayleigh_mass. Expects a number (1/s).
 ---@field rayleigh_stiffness? number Stiffness-proportional Rayleigh damping: the setting physics.rayleigh_stiffness. Expects seconds.
+---@field average_acceleration? boolean True for average acceleration: the setting physics.average_acceleration.
 ---@field gravity? number[] Gravity; {0, 0, -9.81} by default. Expects a list of 3 numbers (m/s²).
 ---@field sleeping? boolean True if bodies at rest fall asleep: the setting physics.sleeping.
 

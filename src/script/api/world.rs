@@ -211,6 +211,8 @@ functions! {
             rayleigh_mass: Option<f64> = Type::Number("1/s", Range::ANY);
             /// Stiffness-proportional Rayleigh damping: the setting physics.rayleigh_stiffness.
             rayleigh_stiffness: Option<f64> = Type::Number("s", Range::ANY);
+            /// True for average acceleration: the setting physics.average_acceleration.
+            average_acceleration: Option<bool>;
             /// Gravity; {0, 0, -9.81} by default.
             gravity: Option<[f64; 3]> = Type::vector(3, "m/s²");
             /// True if bodies at rest fall asleep: the setting physics.sleeping.
@@ -221,6 +223,7 @@ functions! {
                 dt: dt.unwrap_or(default.dt),
                 rayleigh_mass: rayleigh_mass.unwrap_or(default.rayleigh_mass),
                 rayleigh_stiffness: rayleigh_stiffness.unwrap_or(default.rayleigh_stiffness),
+                average_acceleration: average_acceleration.unwrap_or(default.average_acceleration),
                 sleeping: sleeping.unwrap_or(default.sleeping),
                 ..default
             };
