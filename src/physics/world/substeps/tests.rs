@@ -125,7 +125,7 @@ fn frames_and_the_targets_of_drives_move_along_lines_in_a_divided_step() {
 #[test]
 fn a_divided_step_reports_the_means_of_its_parts() {
     let mut sums = Vec::new();
-    let [divided, _] = divided_and_alone(|part| {
+    let [divided, alone] = divided_and_alone(|part| {
         let found = part.report();
         sums.resize(found.len(), 0.0);
         sums.iter_mut().zip(found).for_each(|(sum, found)| *sum += found);
@@ -136,6 +136,9 @@ fn a_divided_step_reports_the_means_of_its_parts() {
         let is_near = (found - expected).abs() < 1e-6 * expected.abs();
         assert!(is_near && expected != 0.0, "{index}: {found}, parts {expected}");
     }
+    // Distances slipped since first contact add up from part to part.
+    let slipped = |press: &Press| press.world.contact(Press::BRICK, ColliderId::new(0)).slip_distance;
+    assert!((slipped(&divided) / slipped(&alone) - 1.0).abs() < 1e-6, "{} m", slipped(&divided));
 }
 
 #[test]
