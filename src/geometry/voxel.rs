@@ -79,6 +79,70 @@ pub struct VoxelMesh {
     pub cell_element: Vec<u32>,
 }
 
+/// Integral of the product of two fields over the filled part of a mesh, `∫ u v dV = Σ uᵀ M v` over its elements: what
+/// finite elements call a consistent mass matrix, at unit density.
+#[derive(Clone, Debug)]
+pub struct VolumeProduct {
+    /// Matrices of equal fills, m³.
+    matrices: Vec<[[f64; 8]; 8]>,
+    /// Node indices of each element with the index of its matrix.
+    elements: Vec<([u32; 8], u32)>,
+}
+
+impl VolumeProduct {
+    /// The product over the filled part of `mesh`.
+    pub fn new(mesh: &VoxelMesh) -> Self {
+        let mut fills: Vec<OccupancyMask> = Vec::new();
+        let kind = |fill: &OccupancyMask| {
+            let found = fills.iter().position(|known| known == fill);
+            found.unwrap_or_else(|| {
+                fills.push(*fill);
+                fills.len() - 1
+            }) as u32
+        };
+        let kinds: Vec<u32> = mesh.occupancy.iter().map(kind).collect();
+        let matrices = fills.iter().map(|fill| element_product(mesh.edge, fill)).collect();
+        Self { matrices, elements: mesh.elements.iter().copied().zip(kinds).collect() }
+    }
+
+    /// Elements with their matrices, m³.
+    pub fn elements(&self) -> impl Iterator<Item = (&[u32; 8], &[[f64; 8]; 8])> {
+        self.elements.iter().map(|(nodes, kind)| (nodes, &self.matrices[*kind as usize]))
+    }
+
+    /// `M u` for the values of a field at `count` nodes.
+    pub fn times(&self, count: usize, value: impl Fn(usize) -> Vec3) -> Vec<Vec3> {
+        let mut product = vec![Vec3::zeros(); count];
+        for (nodes, matrix) in self.elements() {
+            for (&row, weights) in nodes.iter().zip(matrix) {
+                for (&column, weight) in nodes.iter().zip(weights) {
+                    product[row as usize] += value(column as usize) * *weight;
+                }
+            }
+        }
+        product
+    }
+}
+
+/// `∫ N_a N_b dV` over the filled part of a voxel of edge `h`: by the Gauss rule of two points per axis, which is exact,
+/// or over the sub-cells.
+fn element_product(h: f64, fill: &OccupancyMask) -> [[f64; 8]; 8] {
+    let points: Vec<(Vec3, f64)> = if *fill == OccupancyMask::full() {
+        hex8::gauss_points().map(|xi| (xi, h.powi(3) / 8.0)).to_vec()
+    } else {
+        let cells = (0..CELLS_PER_VOXEL).filter(|&cell| fill.contains(cell));
+        cells.map(|cell| (OccupancyMask::centre(cell), h.powi(3) / CELLS_PER_VOXEL as f64)).collect()
+    };
+    let mut product = [[0.0; 8]; 8];
+    for (xi, volume) in points {
+        let weights = hex8::weights(&xi);
+        for (row, a) in product.iter_mut().zip(weights) {
+            row.iter_mut().zip(weights).for_each(|(sum, b)| *sum += volume * a * b);
+        }
+    }
+    product
+}
+
 /// A material point, by its element and local coordinates.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Embedding {

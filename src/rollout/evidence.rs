@@ -49,17 +49,7 @@ pub(super) struct EvidenceCollector {
 impl EvidenceCollector {
     /// Takes the current, settled state as the reference of deformation.
     pub(super) fn new(sim: &Simulation, goal: GoalInScene, criteria: &SuccessCriteria) -> Self {
-        let references: Vec<_> = sim
-            .objects
-            .iter()
-            .map(|object| match object.body {
-                BodyId::Soft(index) => {
-                    let body = &sim.world.soft(index).state;
-                    ReferenceShape::new(&body.x, &body.model.mass).ok().map(|shape| shape.along(&body.frame))
-                }
-                _ => None,
-            })
-            .collect();
+        let references: Vec<_> = sim.objects.iter().map(|object| sim.present_shape(object)).collect();
         let is_other = |i: &usize| !goal.targets.contains(i) && sim.objects[*i].body.is_free();
         Self {
             support_share: criteria.support_share,

@@ -13,7 +13,8 @@ use super::{
 };
 use softvt_benchmark::CONTROL_DT;
 use softvt_common::{cancel, text::hex};
-use softvt_geometry::{Aabb, Pose, Vec3};
+use softvt_evaluation::deformation::ReferenceShape;
+use softvt_geometry::{Aabb, Pose, Vec3, voxel::VolumeProduct};
 use softvt_physics::{
     BodyId, ColliderId, ContactPartner, PhysicsParams, World,
     contact::Friction,
@@ -298,6 +299,15 @@ impl Simulation {
             BodyId::Link(_) => (self.pose(object) * nalgebra::Point3::from(object.bounds.centre())).coords,
             BodyId::World | BodyId::Kinematic(_) => object.start_w.translation.vector,
         }
+    }
+
+    /// The present shape of an object, for measuring deformations from it; `None` if it is rigid or its shape is not
+    /// finite.
+    pub fn present_shape(&self, object: &ObjectInstance) -> Option<ReferenceShape> {
+        let BodyId::Soft(id) = object.body else { return None };
+        let body = &self.world.soft(id).state;
+        let shape = ReferenceShape::of_mesh(&body.x, VolumeProduct::new(&body.model.mesh)).ok()?;
+        Some(shape.with_diagonal(object.bounds.size().norm()))
     }
 
     /// Weight of an object, N; 0 for fixed objects and parts.

@@ -19,7 +19,6 @@
 //! overshoot.
 
 use super::{
-    element::gauss_points,
     force::{ElasticResponse, ElementCorners, deformation_gradient},
     material::ElasticMaterial,
 };
@@ -82,7 +81,10 @@ impl Densification {
     /// The law for voxels of edge `h` (m).
     pub(crate) fn new(material: &ElasticMaterial, h: f64) -> Self {
         let modulus = material.constrained_modulus();
-        Self { scale: modulus * h.powi(3) / 8.0, gradients: gauss_points().map(|xi| hex8::gradients(&xi, h)) }
+        Self {
+            scale: modulus * h.powi(3) / 8.0,
+            gradients: hex8::gauss_points().map(|xi| hex8::gradients(&xi, h)),
+        }
     }
 
     /// Adds force and energy of a voxel at corner positions `x` of which `share` is material. Returns the largest
@@ -231,7 +233,7 @@ mod tests {
             let x = pressed(height, &e);
             prop_assume!(crate::fem::force::min_det(&x, H) > 0.0);
             let d: ElementCorners = std::array::from_fn(|a| Vec3::from_column_slice(&d[3 * a..3 * a + 3]));
-            let centre = gauss_points().iter().map(|xi| deformation_gradient(&x, &hex8::gradients(xi, H))).sum::<Mat3>() / 8.0;
+            let centre = hex8::gauss_points().iter().map(|xi| deformation_gradient(&x, &hex8::gradients(xi, H))).sum::<Mat3>() / 8.0;
             let rotation = polar_svd(&centre);
             let mut blocks = [Mat3::zeros(); 36];
             law().add_tangent(&x, &rotation, SHARE, &mut blocks);

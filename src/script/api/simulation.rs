@@ -125,13 +125,7 @@ impl LuaSimulation {
             fail!(lua, "softvt.simulate: {place}{e}")
         })?;
         let records = sim.objects.iter().map(|object| ObjectMeasurements {
-            settled: match object.body {
-                BodyId::Soft(id) => {
-                    let body = &sim.world.soft(id).state;
-                    ReferenceShape::new(&body.x, &body.model.mass).ok().map(|shape| shape.along(&body.frame))
-                }
-                _ => None,
-            },
+            settled: sim.present_shape(object),
             d_peak_pct: 0.0,
             d_peak_v1_pct: 0.0,
             start_z: sim.centre(object).z,

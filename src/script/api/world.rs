@@ -24,12 +24,12 @@ use softvt_common::{
     parallel::lock,
     text::{format_number, significant},
 };
-use softvt_evaluation::deformation::{Deformation, ReferenceShape};
-use softvt_geometry::{Pose, Quat, Vec3, shape::Shape};
+use softvt_evaluation::deformation::{Deformation, DeformationError, ReferenceShape};
+use softvt_geometry::{Pose, Quat, Vec3, shape::Shape, voxel::VolumeProduct};
 use softvt_physics::{
     AttachmentId, BodyId, ColliderId, ContactPartner, KinematicId, PhysicsParams, SoftId, World,
     contact::{Collider, Friction, SurfaceStiffness},
-    fem::{FemState, StrainLimits, StrainMeter},
+    fem::{FemModel, FemState, StrainLimits, StrainMeter},
     world::{ContactSummary, Penetration, SoftBody, StepFailure},
 };
 use softvt_robot::{PadSpec, pads::PadSurface};
@@ -156,6 +156,16 @@ struct MeasuredBody {
     stable_strain: Option<f64>,
 }
 
+/// The shape of a body whose nodes are at `nodes`, for measuring deformations from it.
+fn reference_shape(
+    nodes: &[Vec3],
+    model: &FemModel,
+    shape: &Shape,
+) -> Result<ReferenceShape, DeformationError> {
+    let reference = ReferenceShape::of_mesh(nodes, VolumeProduct::new(&model.mesh))?;
+    Ok(reference.with_diagonal(shape.bounds().size().norm()))
+}
+
 struct Inner {
     world: World,
     /// Soft bodies by their index in the world.
@@ -272,7 +282,7 @@ impl LuaWorld {
             soft_model(name, shape, body).map_err(|e| wrong(&e))?
         };
         let reserved = reserve_in_world(lua, model.bytes())?;
-        let reference = ReferenceShape::new(&model.mesh.nodes, &model.mass).map_err(|e| wrong(&e))?;
+        let reference = reference_shape(&model.mesh.nodes, &model, shape).map_err(|e| wrong(&e))?;
         let strain = StrainMeter::new(&model, StrainLimits::default());
         let id = inner.world.add_soft(name, model, Some(Arc::new(shape.clone())), &pose, friction);
         let (shape, stable_strain) = (shape.clone(), body.stable_strain());
@@ -505,12 +515,12 @@ class! {
             fn stable_strain(_, this) -> ["number?"] { lock(&this.world).bodies[this.id.index()].stable_strain }
             /// Returns the compressive strain that `percent` of the volume stays below: 1 − σ_min(F) at the Gauss
             /// points, weighted by volume. 95 is usual; a number between 0 and 1 is most likely a share, and an error.
-            fn strain_percentile(lua, this, percent: f64 = PERCENT) -> ["number"] {
+            fn strain_percentile(lua, this, percent: f64 = PERCENT, length: Option<f64> = Type::Number("m", Range::closed(0.0, 0.1))) -> ["number"] {
                 if percent > 0.0 && percent < 1.0 {
                     let (given, meant) = (format_number(percent), significant(100.0 * percent, 6));
                     bail!(lua, "body:strain_percentile: expected percent, got {given}; did you mean {meant}?");
                 }
-                let strain = this.strain(|meter, state| meter.percentile(state, 1.0 - percent / 100.0));
+                let strain = this.strain(|meter, state| meter.percentile(state, 1.0 - percent / 100.0, length.unwrap_or(0.0)));
                 finite(strain).ok_or_else(|| fail!(lua, "body:strain_percentile: the body has no finite strain"))?
             }
             /// Returns the share of the volume, %, with a compressive strain above `strain`.
@@ -530,13 +540,9 @@ class! {
             /// Sets the reference shape of deformation: the rest shape (at the start) or the present one.
             fn set_reference(lua, this, which: String = Type::Choice(&["rest", "now"])) -> [] {
                 let mut inner = lock(&this.world);
-                let body = &inner.world.soft(this.id).state;
-                let mass = &body.model.mass;
-                let reference = if which == "rest" {
-                    ReferenceShape::new(&body.model.mesh.nodes, mass)
-                } else {
-                    ReferenceShape::new(&body.x, mass).map(|shape| shape.along(&body.frame))
-                };
+                let state = &inner.world.soft(this.id).state;
+                let nodes = if which == "rest" { &state.model.mesh.nodes } else { &state.x };
+                let reference = reference_shape(nodes, &state.model, &inner.bodies[this.id.index()].shape);
                 inner.bodies[this.id.index()].reference = reference.map_err(|e| fail(lua, e.to_string()))?;
             }
             /// Returns the normal force of a solid on the body, N.
