@@ -5,8 +5,9 @@
 --
 -- --sweep-protocol press (the default) tests the object alone, between two gel pads on rigid carriers
 -- (scripts/calibration/press.lua). It closes in steps of the width until 5 % of the volume is beyond the stable strain
--- of the material: the smaller of its collapse_strain and damage_strain. D_ref is D at that width, interpolated, and τ
--- = κ D_ref. A press that ends earlier is censored: the file says why, and D_ref is a lower bound. The loose end of the
+-- of the material: the smaller of its collapse_strain and damage_strain. Strains are averaged over 4 mm and found on a
+-- mesh with voxels no larger than that, and at least 18 along the longest edge. D_ref is D at that width, interpolated,
+-- and τ = κ D_ref. A press that ends earlier is censored: the file says why, and D_ref is a lower bound. The loose end of the
 -- window is the widest width at which five trials with the expert's grasp hold while the pads lift; the tight end is
 -- the widest width at which D reaches τ in the press or in those trials.
 --
@@ -64,17 +65,9 @@ for _, name in ipairs(opt.asset) do
   assets[name] = soft_asset("calibrate", name, assets)
 end
 
--- Presses of each asset for its instances: as it is, at the ends of the sizes that the standard variations draw, and at
--- other stiffnesses, with half of the step.
-local VARIANTS = {
-  { 1, 1 },
-  { 0.88, 1 },
-  { 1.12, 1 },
-  { 1, 0.3 },
-  { 1, 3 },
-  { 1, 10 },
-  { 1, 30 },
-}
+-- Presses of each asset for its instances, with half of the step: at the stiffnesses and at the sizes between which the
+-- standard variations draw.
+local STIFFNESSES, SIZES = { 1, 0.3, 3, 10, 30 }, { 0.88, 1.12 }
 
 -- The rows of one variant, as softvt.envelope takes them.
 local function variant_rows(rows)
@@ -92,14 +85,20 @@ local function envelope(name, rows, o)
     if row.asset == name then table.insert(of[row.kind], row) end
   end
   local holds, sweep, last, variants = of.hold, of.sweep, of["end"][1] or {}, {}
-  for _, factors in ipairs(VARIANTS) do
-    local scale, youngs, found = factors[1], factors[2], {}
+  local function add_variant(scale, youngs)
+    local found = {}
     for _, row in ipairs(of.variant) do
       if row.scale == scale and row.youngs_factor == youngs then found[#found + 1] = row end
     end
     if #found > 0 then
       variants[#variants + 1] = { scale = scale, youngs_factor = youngs, rows = variant_rows(found) }
     end
+  end
+  for _, youngs in ipairs(STIFFNESSES) do
+    add_variant(1, youngs)
+  end
+  for _, scale in ipairs(SIZES) do
+    add_variant(scale, 1)
   end
   return softvt.envelope {
     asset = name,
@@ -121,18 +120,15 @@ local function append(rows, kind, name, found)
   end
 end
 
--- Rows of the press of a variant.
-local function press_variant(name, factors, o)
-  local change = { scale = factors[1], youngs_factor = factors[2] }
-  local rows, stable = {}, {}
-  for _, row in ipairs(press.sweep(assets[name], 0.5e-3 * o.step_mm, change).rows) do
+-- Appends the rows of the press of a variant.
+local function append_variant(rows, name, scale, youngs, o, strains)
+  local stable = {}
+  local change = { scale = scale, youngs_factor = youngs }
+  for _, row in ipairs(press.sweep(assets[name], 0.5e-3 * o.step_mm, change, strains).rows) do
+    row.scale, row.youngs_factor = scale, youngs
     if row.stable then stable[#stable + 1] = row end
   end
   append(rows, "variant", name, stable)
-  for _, row in ipairs(rows) do
-    row.scale, row.youngs_factor = change.scale, change.youngs_factor
-  end
-  return rows
 end
 
 -- Tells at the start of a press, which takes minutes, what its result will lack.
@@ -149,11 +145,12 @@ local function tell_doubts(asset)
   end
 end
 
--- Rows of a press test: the sweep, then holds between its contact and τ.
+-- Rows of a press test: the sweep, holds between its contact and τ, and presses at other stiffnesses.
 local function press_asset(name, o)
   local asset, rows = assets[name], {}
   tell_doubts(asset)
-  local sweep = press.sweep(asset, 1e-3 * o.step_mm)
+  local strains = press.strains(asset)
+  local sweep = press.sweep(asset, 1e-3 * o.step_mm, nil, strains)
   append(rows, "sweep", name, sweep.rows)
   append(rows, "end", name, { { ended = sweep.ended, stable_strain = sweep.stable_strain, tilt_deg = sweep.tilt_deg } })
   local found = envelope(name, rows, o)
@@ -164,6 +161,9 @@ local function press_asset(name, o)
     press.carried_end(asset, holds, found.tau)
     append(rows, "hold", name, holds)
   end
+  for _, youngs in ipairs(STIFFNESSES) do
+    append_variant(rows, name, 1, youngs, o, strains)
+  end
   return rows
 end
 
@@ -172,7 +172,7 @@ local function run(point, o)
   if point.part == "press" then
     return press_asset(point.asset, o)
   elseif point.part == "variant" then
-    return press_variant(point.asset, point.factors, o)
+    append_variant(rows, point.asset, point.scale, 1, o)
   elseif point.part == "hold" then
     append(rows, "hold", point.asset, hand.holds(asset, o.step, o.trials, o.hold_s))
   else
@@ -187,8 +187,8 @@ local function points(o)
     for _, part in ipairs(o.sweep_protocol == "press" and { "press" } or { "hold", "sweep" }) do
       list[#list + 1] = { asset = name, part = part }
     end
-    for _, factors in ipairs(o.sweep_protocol == "press" and VARIANTS or {}) do
-      list[#list + 1] = { asset = name, part = "variant", factors = factors }
+    for _, scale in ipairs(o.sweep_protocol == "press" and SIZES or {}) do
+      list[#list + 1] = { asset = name, part = "variant", scale = scale }
     end
   end
   return list

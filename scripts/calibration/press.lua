@@ -15,6 +15,8 @@ local REST_SPEED, REST_S = 5e-4, 0.15 -- largest node speed of an object at rest
 local REST_TIMEOUT_S = 3 -- longest wait for rest, s
 local SETTLE_SPEED, SETTLE_S = 1e-3, 0.5 -- the same for the object alone on the table
 local PERCENTILE = 95 -- share of the volume that stays below the reported strain, %
+local STRAIN_LENGTH = 4e-3 -- length over which a strain is averaged, several cells of a crumb, m
+local FINE, FINE_STEP = 18, 1e-3 -- least resolution of the mesh on which strains are found, and step of the width, m
 local UNSTABLE = 20 -- rows before the first stable one that end a sweep
 local HOLD_S = 1 -- hold after the lift, s
 local REFINEMENTS = 2 -- hold trials near τ, for the tight end
@@ -183,7 +185,6 @@ local function squeeze(bench, width)
     d_pct = d.rms_pct,
     d_v1_pct = d.v1_rms_pct,
     force_n = 0.5 * (bench:force(1) + bench:force(2)),
-    strain_p95 = bench.body:strain_percentile(PERCENTILE),
     min_det_f = bench.min_det_f,
     node_speed_m_s = fastest,
     both_pads = bench:both_touch(),
@@ -203,30 +204,102 @@ local function find_contact(bench, step)
   return bench.width
 end
 
--- Presses from first contact inward in steps of `step` (m) until the 95th percentile of the strain has reached the
--- stable strain, or the press is no longer stable. Returns { rows, stable_strain, ended, tilt_deg }: `ended` says why
--- the sweep ended if the rows do not tell, `tilt_deg` by how much the object has tilted while it settled, if it has.
-function press.sweep(asset, step, change)
-  local bench, problem, stable_strain = press.bench(asset, change)
-  local sweep = { rows = {}, stable_strain = stable_strain, ended = problem }
-  if not bench then return sweep end
-  sweep.tilt_deg = bench.tilt and math.deg(bench.tilt)
-  local rows, width, index = sweep.rows, nil, nil
-  width, sweep.ended = find_contact(bench, CONTACT_STEP)
+-- Presses from first contact inward in steps of `step` (m) until `is_last(row, bench)` or the press is no longer stable.
+-- Returns the rows, and why the press ended if they do not tell.
+local function press_in(bench, step, is_last)
+  local rows, index = {}, nil
+  local width, ended = find_contact(bench, CONTACT_STEP)
   while width and width > 0 do
     local row = squeeze(bench, width)
-    if not row then
-      sweep.ended = bench.problem
-      return sweep
-    end
+    if not row then return rows, bench.problem end
     rows[#rows + 1] = row
-    if not row.stable and (index or #rows >= UNSTABLE) then return sweep end
-    if sweep.stable_strain and row.strain_p95 >= sweep.stable_strain then return sweep end
+    if not row.stable and (index or #rows >= UNSTABLE) then return rows end
+    if is_last(row, bench) then return rows end
     -- Once both pads touch at rest, widths are multiples of the step.
     if index or row.stable then index = (index or math.ceil(width / step - 1e-6)) - 1 end
     width = rounded(index and index * step or width - CONTACT_STEP)
   end
-  sweep.ended = sweep.ended or "the pads have met"
+  return rows, ended or "the pads have met"
+end
+
+-- Resolution at which voxels are no larger than STRAIN_LENGTH, so that strains and forces have converged.
+local function fine_resolution(asset, change)
+  local low, high = asset.shape:bounds()
+  local longest = math.max(high[1] - low[1], high[2] - low[2], high[3] - low[3])
+  local needed = math.ceil((change.scale or 1) * longest / STRAIN_LENGTH)
+  return math.max(FINE, needed, asset.body.resolution)
+end
+
+-- A copy of `change` with another resolution.
+local function at_resolution(change, resolution)
+  local copy = { resolution = resolution }
+  for key, value in pairs(change) do
+    copy[key] = copy[key] or value
+  end
+  return copy
+end
+
+-- Strain over D of a press on a fine mesh, up to the stable strain: a list of { d_pct, strain }, whose field `ended` says
+-- why it ended before, if it did. The strain is the 95th percentile of the volume, each point's averaged over
+-- STRAIN_LENGTH. nil if the material has no stable strain. It does not depend on the stiffness.
+function press.strains(asset, change)
+  change = change or {}
+  local fine = at_resolution(change, change.fine or fine_resolution(asset, change))
+  local bench, problem, stable_strain = press.bench(asset, fine)
+  if not stable_strain then return nil end
+  local found = { { d_pct = 0, strain = 0 }, ended = problem }
+  if not bench then return found end
+  local _, ended = press_in(bench, FINE_STEP, function(row)
+    local last = found[#found]
+    if row.stable and row.d_pct > last.d_pct then
+      last = { d_pct = row.d_pct, strain = bench.body:strain_percentile(PERCENTILE, STRAIN_LENGTH) }
+      found[#found + 1] = last
+    end
+    return last.strain >= stable_strain
+  end)
+  if found[#found].strain < stable_strain then found.ended = ended or "the press on a fine mesh is no longer stable" end
+  return found
+end
+
+-- The strain at `d_pct` in a list of `strains`, along its last two beyond them.
+local function strain_at(list, d_pct)
+  local k = 2
+  while k < #list and list[k].d_pct < d_pct do
+    k = k + 1
+  end
+  local low, high = list[k - 1], list[k]
+  return low.strain + (d_pct - low.d_pct) / (high.d_pct - low.d_pct) * (high.strain - low.strain)
+end
+
+-- Presses in steps of `step` (m) until 5 % of the volume has passed the stable strain, or the press is no longer stable.
+-- Returns { rows, stable_strain, ended, tilt_deg }: `ended` says why the sweep ended if the rows do not tell, `tilt_deg`
+-- by how much the object has tilted while it settled, if it has. Widths, forces and D are those on the mesh of episodes.
+-- The strain of a row is that of a fine mesh (of resolution `change.fine`) at the same D, as it converges far later:
+-- that of `strains`, which are found if they are not given.
+function press.sweep(asset, step, change, strains)
+  change = change or {}
+  local bench, problem, stable_strain = press.bench(asset, change)
+  local sweep = { rows = {}, stable_strain = stable_strain, ended = problem }
+  if not bench then return sweep end
+  sweep.tilt_deg = bench.tilt and math.deg(bench.tilt)
+  if not stable_strain then
+    sweep.rows, sweep.ended = press_in(bench, step, function(row)
+      row.strain_p95 = bench.body:strain_percentile(PERCENTILE)
+      return false
+    end)
+    return sweep
+  end
+  local known = strains or press.strains(asset, change)
+  if #known == 1 then
+    sweep.ended = known.ended
+    return sweep
+  end
+  sweep.rows, sweep.ended = press_in(bench, step, function(row)
+    row.strain_p95 = strain_at(known, row.d_pct)
+    if known.ended and row.d_pct >= known[#known].d_pct then return true end
+    return row.strain_p95 >= stable_strain
+  end)
+  sweep.ended = sweep.ended or known.ended
   return sweep
 end
 

@@ -43,6 +43,7 @@ const BYTES_PER_SOLID: usize = 4 << 10;
 const BYTES_PER_NODE: usize = 64;
 
 const POSITION: Type = Type::vector(3, "m");
+const AVERAGED: Type = Type::Number("m", Range::closed(1e-4, 0.1));
 const PERCENT: Type = Type::Number("%", Range::closed(0.0, 100.0));
 const AXIS_ANGLE: Type = Type::vector(3, "rad");
 
@@ -515,12 +516,22 @@ class! {
             fn stable_strain(_, this) -> ["number?"] { lock(&this.world).bodies[this.id.index()].stable_strain }
             /// Returns the compressive strain that `percent` of the volume stays below: 1 − σ_min(F) at the Gauss
             /// points, weighted by volume. 95 is usual; a number between 0 and 1 is most likely a share, and an error.
-            fn strain_percentile(lua, this, percent: f64 = PERCENT, length: Option<f64> = Type::Number("m", Range::closed(0.0, 0.1))) -> ["number"] {
+            /// With a `length`, of a voxel or more, the strain of a point is its average within that distance.
+            fn strain_percentile(lua, this, percent: f64 = PERCENT, length: Option<f64> = AVERAGED) -> ["number"] {
                 if percent > 0.0 && percent < 1.0 {
                     let (given, meant) = (format_number(percent), significant(100.0 * percent, 6));
                     bail!(lua, "body:strain_percentile: expected percent, got {given}; did you mean {meant}?");
                 }
-                let strain = this.strain(|meter, state| meter.percentile(state, 1.0 - percent / 100.0, length.unwrap_or(0.0)));
+                let edge = this.read(|body| body.state.model.mesh.edge);
+                if let Some(length) = length.filter(|length| *length < edge) {
+                    let (length, edge) = (significant(1e3 * length, 3), significant(1e3 * edge, 3));
+                    bail!(
+                        lua,
+                        "body:strain_percentile: length: {length} mm is below a voxel, {edge} mm; raise the resolution of the body"
+                    );
+                }
+                let (tail, length) = (1.0 - percent / 100.0, length.unwrap_or(0.0));
+                let strain = this.strain(|meter, state| meter.percentile(state, tail, length));
                 finite(strain).ok_or_else(|| fail!(lua, "body:strain_percentile: the body has no finite strain"))?
             }
             /// Returns the share of the volume, %, with a compressive strain above `strain`.
