@@ -30,12 +30,17 @@ def checks():
     for r in elements.clamped("without", gaps=(48, 46)) + elements.clamped("gauss", gaps=(48, 46)):
         yield f"published clamped {r['law']} {r['gap_mm']} mm", abs(r["force_n"] / r["published_n"] - 1), 6e-4
     yield "patch test", elements.patch()[0]["max_rel_disp_error"], 1e-9
+    for r in elements.fillings():
+        yield f"homogeneous strain of partly filled voxels, nu {r['nu']}", r["max_rel_force_error"], 1e-12
+        yield f"zero modes beside the six, nu {r['nu']}", max(abs(m - 6) for m in r["zero_modes"]), 0
+    for r in elements.bending():
+        yield f"pure bending, nu {r['nu']}", abs(r["moment_over_ei"] - 1), 1e-9
     one = elements.spurious()[0]
     yield "force is -dU/dx", one["force_error_exact"], 1e-7
     yield "no moment", one["moment_exact"], 1e-12
     for old in committed("small_strain", resolution=6, pad_offset_mm=[0.0, 0.0], pad_mm=22.0, contact="softvt"):
         yield "small strain", differ(old, small_strain.row(6), ["stiffness_n_per_m", "d_pct_per_mm_7cubed"]), LIMIT
-    fields = ["force_grip_n", "force_hold_n", "d_grip_pct", "d_hold_pct", "min_det_f_grip"]
+    fields = ["force_grip_n", "force_hold_n", "d_grip_pct", "d_hold_pct", "d_hold_volume_pct", "min_det_f_grip"]
     for group, options, gap in (("cube", CUBE, 49.0), ("cube", CUBE, 48), ("round", CAPSULE | dict(resolution=6), 38)):
         old = committed(group, shape=options["shape"], gap_mm=gap, resolution=6)[0]
         run = Squeeze(**options)

@@ -1,13 +1,14 @@
-"""Corotated B-bar hexahedron: one rotation per element, exact forces, exact tangent.
+"""Corotated hexahedron with incompatible modes: one rotation per element, exact forces, exact tangent.
 
 Energy of an element, with nodes x_a, rest nodes X_a, stiffness K0 and R = polar(F):
 
     U = 1/2 (y - X)^T K0 (y - X),   y_a = R^T x_a,   F = sum_a x_a g_a^T,
 
-g_a being the mean of the shape gradients over the points that integrate K0, with their volumes. As R depends on x, the force is
+g_a being the mean of the shape gradients over the material. As R depends on x, the force is
 -dU/dx_a = -R (p_a - q x g_a) with p = K0 (y - X), S = R^T F, m = sum_a y_a x p_a, q = (tr S I - S)^-1 m.
 
-B-bar: Hughes, The Finite Element Method, 2000, 4.5.2. Corotation: Mueller & Gross 2004; the term q follows from
+Incompatible modes whose gradients have no mean: Wilson et al. 1973; Taylor, Beresford & Wilson 1976. Stiffness against
+hourglass shapes alone: Flanagan & Belytschko 1981. Corotation: Mueller & Gross 2004; the term q follows from
 differentiating the polar decomposition (RtdF - dFtR = [(tr S I - S) w]x for dR = R [w]x).
 """
 
@@ -37,7 +38,7 @@ def gradients(xi):
     return out
 
 
-GHOST = 0.05  # share of the full stiffness that a partly filled voxel has besides that of its filled points
+GHOST = 0.05  # of a full voxel: what a partly filled one has besides its filled points
 
 
 def mean_gradient(inside, edge):
@@ -52,42 +53,43 @@ def mean_gradient(inside, edge):
     return (share * filled + GHOST * whole) / (share + GHOST) / edge
 
 
-def bbar_stiffness(points, volumes, edge, youngs, poisson):
-    """B-bar stiffness (24, 24), N/m, by the quadrature `points` (local) with `volumes` (m^3).
+def quadrature(inside):
+    """Points (n, 3) and weights (n,), in voxels, of the measure that integrates K0; `inside` are the filled sub-points.
 
-    The mean dilatation is the average over these same points.
+    The ghost of a partly filled voxel is the spread of a strain over the Gauss points: it has no volume and no first moment.
     """
-    lam = youngs * poisson / ((1 + poisson) * (1 - 2 * poisson))
-    mu = youngs / (2 * (1 + poisson))
-    grad = gradients(points) / edge
-    volumes = np.asarray(volumes, float)
-    div = grad.reshape(len(grad), 24)
-    mean_div = volumes @ div / volumes.sum()
-    elastic = np.diag([2 * mu] * 3 + [mu] * 3)
-    elastic[:3, :3] += lam
-    stiffness = np.zeros((24, 24))
-    for g, d, v in zip(grad, div, volumes):
-        b = np.zeros((6, 24))
-        for a in range(8):
-            x, y, z = g[a]
-            b[:, 3 * a : 3 * a + 3] = [[x, 0, 0], [0, y, 0], [0, 0, z], [y, x, 0], [0, z, y], [z, 0, x]]
-        b[:3] += (mean_div - d) / 3.0
-        stiffness += v * b.T @ elastic @ b
-    return 0.5 * (stiffness + stiffness.T)
-
-
-def full_stiffness(edge, youngs, poisson):
-    """Stiffness of a wholly filled voxel: 2x2x2 Gauss."""
-    return bbar_stiffness(GAUSS, np.full(8, edge**3 / 8), edge, youngs, poisson)
+    if inside.all():
+        return GAUSS, np.full(8, 1 / 8)
+    points = np.concatenate([SUBPOINTS[inside], GAUSS, [[0.5] * 3]])
+    return points, np.r_[np.full(inside.sum(), SUB**-3.0), np.full(8, GHOST / 8), -GHOST]
 
 
 def filled_stiffness(inside, edge, youngs, poisson):
-    """Stiffness of a voxel of which the sub-points `inside` (216 booleans) are filled."""
-    full = full_stiffness(edge, youngs, poisson)
-    if inside.all():
-        return full
-    part = bbar_stiffness(SUBPOINTS[inside], np.full(inside.sum(), (edge / SUB) ** 3), edge, youngs, poisson)
-    return part + GHOST * full
+    """Stiffness K0 (24, 24), N/m, of a voxel of which the sub-points `inside` (216 booleans) are filled.
+
+    Eleven scalar shapes: the trilinear ones and the incompatible (xi_k - c_k)^2, condensed at the end.
+    """
+    mu, bulk = youngs / (2 * (1 + poisson)), youngs / (3 * (1 - 2 * poisson))
+    points, volumes = quadrature(inside)
+    volumes = volumes * edge**3
+    local = points - volumes @ points / volumes.sum()
+    grad = np.concatenate([gradients(points), 2 * local[:, :, None] * np.eye(3)], axis=1) / edge
+    div = grad.reshape(-1, 33)
+    # strain (point, i, j, shape, component) of a unit amplitude, a tensor of nine
+    half = 0.5 * np.einsum("nsj,ik->nijsk", grad, np.eye(3))
+    strain = (half + half.swapaxes(1, 2)).reshape(-1, 9, 33)
+    dev = strain - np.eye(3).reshape(1, 9, 1) / 3 * div[:, None]
+    # the dilatation in the least-squares sense by 1, x, y, z: its energy is bulk/2 moment^T gram^-1 moment
+    linear = np.c_[np.ones(len(local)), local]
+    moment, gram = (linear * volumes[:, None]).T @ div, (linear * volumes[:, None]).T @ linear
+    k = 2 * mu * np.einsum("n,nci,ncj->ij", volumes, dev, dev, optimize=True) + bulk * moment.T @ np.linalg.solve(gram, moment)
+    k = k[:24, :24] - k[:24, 24:] @ np.linalg.solve(k[24:, 24:], k[24:, :24])
+    return 0.5 * (k + k.T)
+
+
+def full_stiffness(edge, youngs, poisson):
+    """Stiffness of a wholly filled voxel."""
+    return filled_stiffness(np.ones(SUB**3, bool), edge, youngs, poisson)
 
 
 def cross_matrix(v):

@@ -2,10 +2,11 @@
 
 import numpy as np
 
-from .element import CORNERS, Corotated, full_stiffness, polar
+from .element import CORNERS, GAUSS, SUBPOINTS, Corotated, filled_stiffness, full_stiffness, gradients, polar
 from .measure import deformation
 from .mesh import block
 from .statics import GRAVITY, Elastic, factor
+from .truth import bbar_stiffness
 
 E, NU, RHO = 3e4, 0.4, 300.0
 
@@ -77,6 +78,52 @@ def bar():
     return rows
 
 
+def _fillings():
+    """Filled sub-points: all, single points, cuts by planes, and random ones."""
+    rng = np.random.default_rng(0)
+    yield np.ones(len(SUBPOINTS), bool)
+    for _ in range(10):
+        yield np.arange(len(SUBPOINTS)) == rng.integers(len(SUBPOINTS))
+        yield (SUBPOINTS - rng.uniform(0.2, 0.8, 3)) @ rng.normal(size=3) < 0
+        yield rng.random(len(SUBPOINTS)) < rng.uniform(0.05, 0.95)
+
+
+def fillings():
+    """One voxel, however filled: forces of a homogeneous strain against stress times mean gradient, and the zero modes."""
+    rows, h = [], 0.05 / 6
+    g = np.array([[1e-3, 2e-3, -1e-3], [0.5e-3, -2e-3, 1e-3], [1e-3, 0, 1.5e-3]])
+    e = (g + g.T) / 2
+    for nu in (0.0, 0.3, 0.4, 0.499):
+        error, modes, least = 0.0, [], []
+        stress = E / (1 + nu) * (e + nu / (1 - 2 * nu) * np.trace(e) * np.eye(3))
+        for inside in _fillings():
+            k = filled_stiffness(inside, h, E, nu)
+            mean = gradients(GAUSS if inside.all() else SUBPOINTS[inside]).mean(0)
+            exact = inside.mean() * h * h * mean @ stress
+            error = max(error, np.abs(k @ (CORNERS * h @ g.T).ravel() - exact.ravel()).max() / np.abs(exact).max())
+            values = np.linalg.eigvalsh(k) / (E * h)
+            modes.append(int((np.abs(values) < 1e-10).sum()))
+            least.append(float(values[modes[-1]]))
+        row = dict(test="fillings", nu=nu, voxels=len(modes), max_rel_force_error=float(error))
+        rows.append(row | dict(zero_modes=[min(modes), max(modes)], least_stiffness_over_eh=min(least)))
+    return rows
+
+
+def bending():
+    """Pure bending of a bar one voxel thick: end moment over that of the beam with free sides, E I."""
+    rows, h = [], 0.01
+    for nu in (0.0, 0.3, 0.4, 0.499):
+        mesh = block([8, 1, 1], h)
+        x, kappa = mesh.nodes, 0.1
+        lo, hi = np.where(x[:, 0] < 1e-9)[0], np.where(x[:, 0] > 8 * h - 1e-9)[0]
+        arm = x[:, 2] - h / 2
+        fixed = np.r_[_dofs(lo, 0), _dofs(hi, 0), _dofs(lo[:2], 2), _dofs(lo[0], 1)]
+        value = np.r_[0 * arm[lo], 8 * h * kappa * arm[hi], 0, 0, 0]
+        _, f = _linear(mesh, E, nu, fixed, value)
+        rows.append(dict(test="bending", nu=nu, moment_over_ei=float(f[hi, 0] @ arm[hi] / (E * h**4 / 12 * kappa))))
+    return rows
+
+
 def cantilever():
     """Tip deflection under gravity against Timoshenko with Cowper's shear coefficient (1966)."""
     rows, length, h, youngs = [], 0.10, 0.02, 3e5
@@ -136,13 +183,17 @@ PUBLISHED = {
 
 
 def clamped(law, resolution=6, edge=0.05, pad=0.022, gaps=(48, 46, 44, 42, 38, 34, 30)):
-    """Nodes under two pads clamped and moved; law "exact" (softvt's), "without" the term q, or "gauss"."""
+    """Nodes under two pads clamped and moved; law "exact" (softvt's), or those of the outside reference's rows, which have
+    the B-bar element: "without" the term q, or "gauss".
+    """
     mesh = block([resolution] * 3, edge / resolution)
     x = mesh.nodes
     under = np.all(np.abs(x[:, 1:] - edge / 2) <= pad / 2 + 1e-9, axis=1)
     lo, hi = np.where(under & (x[:, 0] < 1e-9))[0], np.where(under & (x[:, 0] > edge - 1e-9))[0]
     held = (3 * np.r_[lo, hi][:, None] + np.arange(3)).ravel()
     body = Elastic(mesh, E, NU)
+    if law != "exact":
+        body.batch.k0 = bbar_stiffness(np.full((1, 3), mesh.edge), E, NU)[0]
     points = _PerPoint(mesh.edge, mesh.nodes[mesh.elements])
 
     def force(now):
@@ -203,7 +254,7 @@ def spurious():
 
 def rows():
     """All element rows."""
-    out = patch() + bar() + cantilever() + spurious()
+    out = patch() + fillings() + bar() + bending() + cantilever() + spurious()
     for law in ("exact", "without", "gauss"):
         out += clamped(law)
     return out

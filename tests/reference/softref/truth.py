@@ -37,8 +37,8 @@ def _axis(low, high, edges, first, ratio):
     return np.array(lines)
 
 
-def _stiffness(size, youngs, poisson):
-    """B-bar stiffness (n, 24, 24) of bricks of sides `size` (n, 3)."""
+def bbar_stiffness(size, youngs, poisson):
+    """B-bar stiffness (n, 24, 24) of bricks of sides `size` (n, 3), with the mean dilatation (Hughes 2000, 4.5.2)."""
     lam, mu = youngs * poisson / (1 + poisson) / (1 - 2 * poisson), youngs / 2 / (1 + poisson)
     g = gradients(GAUSS)[None] / size[:, None, None, :]
     n = len(size)
@@ -71,7 +71,7 @@ def solve(pad, offset_y, first, ratio, edge=0.05, youngs=3e4, poisson=0.4):
     p = np.stack(np.meshgrid(x, y, z, indexing="ij"), -1).reshape(-1, 3)
     dof = (3 * node[:, :, None] + np.arange(3)).reshape(-1, 24)
     k = sp.csr_matrix(
-        (_stiffness(size, youngs, poisson).ravel(), (np.repeat(dof, 24, 1).ravel(), np.tile(dof, (1, 24)).ravel())), (p.size, p.size)
+        (bbar_stiffness(size, youngs, poisson).ravel(), (np.repeat(dof, 24, 1).ravel(), np.tile(dof, (1, 24)).ravel())), (p.size, p.size)
     )
     under = (p[:, 0] > half - 1e-12) & (np.abs(p[:, 1] - offset_y) < pad / 2 + 1e-9) & (p[:, 2] < pad / 2 + 1e-9)
     held = np.zeros(p.shape, bool)
