@@ -9,11 +9,12 @@ import numpy as np
 
 TANGENTIAL = 0.5
 RIGID = 1e9
+LAYER = 7.0  # modulus of a soft surface in E/h
 
 
 def modulus(youngs, edge, collider=RIGID):
-    """Normal modulus per area, Pa/m: min(1e9, 30 E/h) of the body in series with the collider's."""
-    soft = min(1e9, 30.0 * youngs / edge)
+    """Normal modulus per area, Pa/m: min(1e9, LAYER E/h) of the body in series with the collider's."""
+    soft = min(RIGID, LAYER * youngs / edge)
     return 1.0 / (1.0 / soft + 1.0 / collider)
 
 
