@@ -1,8 +1,9 @@
 """Voxel meshes of softvt's rule, and surface samples with areas. Bodies rest on z = 0, centred on the z axis."""
 
 import numpy as np
+import scipy.sparse as sp
 
-from .element import CORNERS, SUB, SUBPOINTS, weights
+from .element import CORNERS, GAUSS, SUB, SUBPOINTS, weights
 
 LEAST_FILL = 0.01
 MASS_FLOOR = 1e-3
@@ -32,6 +33,13 @@ class Mesh:
         self.lumps = np.maximum(self.lumps, MASS_FLOOR * edge**3)
         if body is not None:
             self.lumps *= body.volume / self.lumps.sum()
+
+    def product(self):
+        """Integral of N_a N_b over the material, sparse (n, n) in m^3: exact in full voxels, else by the filled sub-points."""
+        table = [weights(GAUSS if p.all() else SUBPOINTS[p]) for p in self.patterns]
+        table = np.array([p.mean() * self.edge**3 * w.T @ w / len(w) for p, w in zip(self.patterns, table)])
+        pairs = np.repeat(self.elements, 8, 1).ravel(), np.tile(self.elements, (1, 8)).ravel()
+        return sp.csr_matrix((table[self.pattern_of].ravel(), pairs), [len(self.nodes)] * 2)
 
     def diagonal(self):
         """Diagonal of the bounding box of the nodes, m."""

@@ -37,6 +37,7 @@ class Squeeze:
         )
         body = BODIES[o["shape"]](o)
         self.mesh = meshes.voxel_mesh(body, o["resolution"])
+        self.product, self.diagonal = self.mesh.product(), float(np.linalg.norm(body.size))
         mirrors = {0: 0.0} | ({1: 0.0} if o["pad_offset_m"][0] == 0 else {})
         self.scene = Scene(self.mesh, body, o["youngs_pa"], o["poisson"], o["density"], mirrors, o["spacing_m"])
         self.width = float(body.bounds[1][0] - body.bounds[0][0])
@@ -89,7 +90,7 @@ class Squeeze:
             friction_z_n=float(pad["force"][2]) / 2,
             table_n=float(table["force"][2]),
             d_pct=deformation(self.mesh.nodes, x),
-            d_volume_pct=deformation(self.mesh.nodes, x, lumps),
+            d_volume_pct=deformation(self.mesh.nodes, x, self.product, self.diagonal),
             min_det_f=float(det[real].min()),
             slipping=pad["slipping"],
             centre_z_m=float(lumps @ x[:, 2] / lumps.sum()),
@@ -146,7 +147,7 @@ class Squeeze:
             elements=len(self.mesh.elements),
             weight_n=s.weight_n,
             diagonal_nodes_mm=1e3 * self.mesh.diagonal(),
-            diagonal_skin_mm=1e3 * float(np.linalg.norm(s.body.size)),
+            diagonal_skin_mm=1e3 * self.diagonal,
         )
         out |= {f"{k}_m": o[f"{k}_m"] for k in ("size", "radius", "length") if f"{k}_m" in o}
         out |= dict(
