@@ -36,6 +36,7 @@ return softvt.asset {
     youngs_pa = 90e3,
     poisson = 0.37,
     density = 300,
+    loss_factor = 0.20,
     resolution = 12,
     collapse_strain = 0.10,
     damage_strain = 0.30,

@@ -22,6 +22,7 @@ return softvt.asset {
     youngs_pa = 30e3,
     poisson = 0.40,
     density = 200,
+    loss_factor = 0.10,
     resolution = 8,
     collapse_strain = 0.10,
     damage_strain = 0.60,

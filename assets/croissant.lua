@@ -62,6 +62,7 @@ return softvt.asset {
     youngs_pa = 160e3,
     poisson = 0.36,
     density = 260,
+    loss_factor = 0.15,
     resolution = 12,
     collapse_strain = 0.08,
     damage_strain = 0.10,

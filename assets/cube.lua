@@ -8,7 +8,14 @@ local core = SIZE - 2 * EDGE
 return softvt.asset {
   name = "cube",
   shape = softvt.shape.box { size = { core, core, core } }:round(EDGE):translate(0, 0, SIZE / 2),
-  body = softvt.soft { youngs_pa = 40e3, poisson = 0.40, density = 200, collapse_strain = 0.07, damage_strain = 0.50 },
+  body = softvt.soft {
+    youngs_pa = 40e3,
+    poisson = 0.40,
+    density = 200,
+    loss_factor = 0.15,
+    collapse_strain = 0.07,
+    damage_strain = 0.50,
+  },
   hints = { grasp_height_m = SIZE / 2 },
   visuals = { material.foam { base = { 0.075, 0.30, 0.62 }, seed = 131 } },
 }

@@ -53,6 +53,7 @@ return softvt.asset {
     youngs_pa = 130e3,
     poisson = 0.38,
     density = 340,
+    loss_factor = 0.15,
     resolution = 10,
     collapse_strain = 0.08,
     damage_strain = 0.07,

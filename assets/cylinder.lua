@@ -10,7 +10,14 @@ return softvt.asset {
     .cylinder { radius = RADIUS - EDGE, height = HEIGHT - 2 * EDGE }
     :round(EDGE)
     :translate(0, 0, HEIGHT / 2),
-  body = softvt.soft { youngs_pa = 50e3, poisson = 0.40, density = 200, collapse_strain = 0.07, damage_strain = 0.50 },
+  body = softvt.soft {
+    youngs_pa = 50e3,
+    poisson = 0.40,
+    density = 200,
+    loss_factor = 0.15,
+    collapse_strain = 0.07,
+    damage_strain = 0.50,
+  },
   hints = { grasp_height_m = HEIGHT / 2 },
   visuals = { material.foam { base = { 0.72, 0.155, 0.085 }, seed = 141 } },
 }

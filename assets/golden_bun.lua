@@ -42,7 +42,14 @@ table.insert(crust.layers, {
 return softvt.asset {
   name = "golden_bun",
   shape = pinwheel:subtract(table_top, 4 * mm),
-  body = softvt.soft { youngs_pa = 220e3, poisson = 0.36, density = 380, collapse_strain = 0.10, damage_strain = 0.12 },
+  body = softvt.soft {
+    youngs_pa = 220e3,
+    poisson = 0.36,
+    density = 380,
+    loss_factor = 0.20,
+    collapse_strain = 0.10,
+    damage_strain = 0.12,
+  },
   hints = { grasp_height_m = 21 * mm },
   visuals = { crust },
 }

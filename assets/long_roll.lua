@@ -51,6 +51,7 @@ return softvt.asset {
     youngs_pa = 35e3,
     poisson = 0.32,
     density = 200,
+    loss_factor = 0.20,
     resolution = 12,
     collapse_strain = 0.10,
     damage_strain = 0.35,

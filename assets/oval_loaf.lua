@@ -50,6 +50,7 @@ return softvt.asset {
     youngs_pa = 180e3,
     poisson = 0.37,
     density = 350,
+    loss_factor = 0.20,
     resolution = 8,
     collapse_strain = 0.12,
     damage_strain = 0.12,

@@ -23,7 +23,14 @@ local seeded = bun:bumps {
 return softvt.asset {
   name = "sesame_bun",
   shape = seeded:paint { material = 1 }:paint { material = 0, region = bun:round(0.25 * mm) },
-  body = softvt.soft { youngs_pa = 45e3, poisson = 0.34, density = 220, collapse_strain = 0.10, damage_strain = 0.35 },
+  body = softvt.soft {
+    youngs_pa = 45e3,
+    poisson = 0.34,
+    density = 220,
+    loss_factor = 0.20,
+    collapse_strain = 0.10,
+    damage_strain = 0.35,
+  },
   hints = { grasp_height_m = 22 * mm },
   visuals = {
     material.crust {

@@ -26,6 +26,7 @@ return softvt.asset {
     youngs_pa = 110e3,
     poisson = 0.38,
     density = 320,
+    loss_factor = 0.20,
     resolution = 8,
     collapse_strain = 0.12,
     damage_strain = 0.15,

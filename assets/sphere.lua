@@ -11,7 +11,14 @@ local table_top = softvt.shape.box { size = { 0.1, 0.1, 0.02 } }:translate(0, 0,
 return softvt.asset {
   name = "sphere",
   shape = ball:subtract(table_top, 2 * mm),
-  body = softvt.soft { youngs_pa = 60e3, poisson = 0.40, density = 200, collapse_strain = 0.10, damage_strain = 0.60 },
+  body = softvt.soft {
+    youngs_pa = 60e3,
+    poisson = 0.40,
+    density = 200,
+    loss_factor = 0.10,
+    collapse_strain = 0.10,
+    damage_strain = 0.60,
+  },
   hints = { grasp_height_m = SIZE / 2 },
   visuals = { material.silicone { base = { 0.86, 0.60, 0.05 }, seed = 171 } },
 }

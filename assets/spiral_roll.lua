@@ -57,7 +57,14 @@ return softvt.asset {
     :subtract(table_top)
     :paint { material = 1, region = upper }
     :paint { material = 2, region = groove },
-  body = softvt.soft { youngs_pa = 60e3, poisson = 0.35, density = 240, collapse_strain = 0.10, damage_strain = 0.25 },
+  body = softvt.soft {
+    youngs_pa = 60e3,
+    poisson = 0.35,
+    density = 240,
+    loss_factor = 0.20,
+    collapse_strain = 0.10,
+    damage_strain = 0.25,
+  },
   hints = { grasp_height_m = 20 * mm },
   visuals = {
     case,

@@ -26,7 +26,14 @@ end
 return softvt.asset {
   name = "steamed_bun",
   shape = bun,
-  body = softvt.soft { youngs_pa = 25e3, poisson = 0.30, density = 180, collapse_strain = 0.12, damage_strain = 0.40 },
+  body = softvt.soft {
+    youngs_pa = 25e3,
+    poisson = 0.30,
+    density = 180,
+    loss_factor = 0.20,
+    collapse_strain = 0.12,
+    damage_strain = 0.40,
+  },
   hints = { grasp_height_m = 22 * mm },
   visuals = { skin },
 }

@@ -56,6 +56,7 @@ return softvt.asset {
     youngs_pa = 75e3,
     poisson = 0.36,
     density = 280,
+    loss_factor = 0.20,
     resolution = 16,
     collapse_strain = 0.10,
     damage_strain = 0.20,

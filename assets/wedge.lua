@@ -17,7 +17,14 @@ local ramp = softvt.shape.prism {
 return softvt.asset {
   name = "wedge",
   shape = ramp:round(EDGE),
-  body = softvt.soft { youngs_pa = 50e3, poisson = 0.40, density = 220, collapse_strain = 0.07, damage_strain = 0.50 },
+  body = softvt.soft {
+    youngs_pa = 50e3,
+    poisson = 0.40,
+    density = 220,
+    loss_factor = 0.15,
+    collapse_strain = 0.07,
+    damage_strain = 0.50,
+  },
   hints = { grasp_height_m = 21.5 * mm, grasp_offset_m = -7 * mm },
   visuals = { material.foam { base = { 0.10, 0.42, 0.16 }, seed = 151 } },
 }

@@ -52,6 +52,7 @@ return softvt.asset {
     youngs_pa = 55e3,
     poisson = 0.34,
     density = 230,
+    loss_factor = 0.20,
     resolution = 8,
     collapse_strain = 0.08,
     damage_strain = 0.20,

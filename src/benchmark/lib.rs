@@ -155,6 +155,9 @@ pub struct Condition {
     /// Built-in policy in place of that of the run, as `--policy` takes it; `None` for the same.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub policy: Option<String>,
+    /// True to repeat the actions of the reference in place of a policy.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub replay: bool,
     /// Kind of suites to which the condition applies; `None` for all.
     pub only: Option<ObjectType>,
     #[serde(default)]

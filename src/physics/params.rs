@@ -13,16 +13,18 @@ softvt_common::settings! {
     /// [`World`](super::World) assumes valid ones.
     pub struct PhysicsParams {
         /// Time step. Control runs at 20 Hz independently of it, so it must divide 0.05 s in the benchmark. Limits and
-        /// grip windows are calibrated with the default. A smaller step damps the motion of soft bodies less; that of
-        /// the hand does not depend on it.
+        /// grip windows are calibrated with the default.
         dt: f64 = 1.0 / 60.0, "s", Range::closed(1e-4, 0.05);
+        /// Factor on the number of voxels along each edge of soft bodies, which shows how a result depends on the mesh.
+        mesh_refinement: f64 = 1.0, "", Range::closed(0.25, 4.0);
         /// Mass-proportional Rayleigh damping of soft bodies (α, as air drag). The paper's engine uses 2.5.
         rayleigh_mass: f64 = 0.0, "1/s", Range::closed(0.0, 1e3);
-        /// Stiffness-proportional Rayleigh damping of soft bodies (β). Implicit Euler adds its step: motion is damped
-        /// by β + `dt`, by default 21.7 ms, so that a smaller step damps less. Equilibria do not depend on it.
+        /// Stiffness-proportional Rayleigh damping (β) of soft bodies whose material has no loss factor. Implicit Euler
+        /// adds its step. Equilibria do not depend on it.
         rayleigh_stiffness: f64 = 5e-3, "s", Range::closed(0.0, 1.0);
-        /// True to integrate soft bodies by average acceleration in place of implicit Euler, whose step damps motion.
-        average_acceleration: bool = false;
+        /// True to integrate soft bodies by average acceleration, which adds next to no damping; false for implicit
+        /// Euler, whose step damps motion.
+        average_acceleration: bool = true;
         /// Dissipation time scale τ_d of contact springs, s (Castro et al. 2022). A surface that recedes faster
         /// than the springs relax is released; the value is small compared with `dt`, so that friction does not
         /// lift a sliding surface.

@@ -102,7 +102,7 @@ pub fn table(suite: &ConditionTable, format: TerminalFormat) -> String {
     let episodes = suite.rows.iter().find_map(|row| row.outcome.as_ref()).map_or(0, |o| o.episodes);
     let episodes = counted(episodes, "episode");
     text.title(format_args!("{} · {} · {conditions} · {episodes} each", suite.suite, suite.policy));
-    let width = text.width().saturating_sub(51).clamp(16, 40);
+    let width = text.width().saturating_sub(59).clamp(16, 40);
     let number = |heading, width, cell: fn(&ConditionRow, &ConditionTable) -> String| {
         Column::number(heading, move |row: &ConditionRow| cell(row, suite)).width(width)
     };
@@ -117,6 +117,11 @@ pub fn table(suite: &ConditionTable, format: TerminalFormat) -> String {
         }),
         number("Δ Safety", 9, |row, suite| {
             change(row.paired().filter(|_| suite.deformable), 1, |of| of.safety)
+        }),
+        number("turned", 7, |row, suite| {
+            let paired =
+                row.paired().map(|paired| if suite.deformable { &paired.safety } else { &paired.goal });
+            paired.map_or_else(String::new, |of| (of.better + of.worse).to_string())
         }),
         number("D/limit", 10, |row, suite| {
             outcome_cell(row, suite.deformable, |of| decimal(of.d_over_tau.mean, 2))
@@ -134,7 +139,8 @@ pub fn table(suite: &ConditionTable, format: TerminalFormat) -> String {
         }
     }
     text.note(
-        "Δ: change from the reference on the same episodes · D/limit: mean of peak D over τ · *: p < 0.05 (paired tests)",
+        "Δ: change from the reference on the same episodes · turned: episodes with another Safety (rigid: Goal) · D/limit: \
+         mean of peak D over τ · *: p < 0.05 (paired tests)",
     );
     if format.has_details {
         for row in &suite.rows {

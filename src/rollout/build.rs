@@ -68,6 +68,9 @@ pub(super) fn add_all(
         if instances.iter().any(|known| known.name == object.name) {
             return Err(SceneBuildError::DuplicateName(object.name.clone()).of(object));
         }
+        let factor = world.params.mesh_refinement;
+        let refined = (factor != 1.0).then(|| object.refined(factor));
+        let object = refined.as_ref().unwrap_or(object);
         add(world, object, cache, &mut instances).map_err(|error| error.of(object))?;
     }
     Ok(instances)

@@ -55,7 +55,11 @@ impl EvidenceCollector {
             support_share: criteria.support_share,
             touch_force_n: criteria.touch_force_n,
             others: (0..sim.objects.len()).filter(is_other).collect(),
-            deformations: deformations(&references, sim).collect(),
+            deformations: references
+                .iter()
+                .zip(&sim.objects)
+                .map(|(shape, object)| measured(shape.as_ref(), sim, object))
+                .collect(),
             references,
             crushed: goal.targets.iter().map(|&target| strain_meter(sim, &sim.objects[target])).collect(),
             targets: Vec::with_capacity(goal.targets.len()),
@@ -106,8 +110,12 @@ impl EvidenceCollector {
         time_s: f64,
         is_last: bool,
     ) -> Result<Evidence<'a>, String> {
-        self.deformations.clear();
-        self.deformations.extend(deformations(&self.references, sim));
+        for ((d, reference), object) in self.deformations.iter_mut().zip(&self.references).zip(&sim.objects) {
+            // A sleeping body does not move.
+            if d.is_none() || !sim.world.is_asleep(object.body) {
+                *d = measured(reference.as_ref(), sim, object);
+            }
+        }
         let mut bodies = std::mem::take(&mut self.bodies);
         bodies.clear();
         bodies.extend(self.others.iter().map(|&i| self.body(sim, i)));
@@ -247,14 +255,14 @@ fn strain_meter(sim: &Simulation, object: &ObjectInstance) -> Option<StrainMeter
     }
 }
 
-fn deformations<'a>(
-    references: &'a [Option<ReferenceShape>],
-    sim: &'a Simulation,
-) -> impl Iterator<Item = Option<Deformation>> + 'a {
-    sim.objects.iter().zip(references).map(|(object, reference)| {
-        let BodyId::Soft(index) = object.body else { return None };
-        reference.as_ref()?.measure(&sim.world.soft(index).state.x).ok()
-    })
+/// The present deformation of an object from its reference; `None` if it is rigid or cannot be measured.
+fn measured(
+    reference: Option<&ReferenceShape>,
+    sim: &Simulation,
+    object: &ObjectInstance,
+) -> Option<Deformation> {
+    let BodyId::Soft(index) = object.body else { return None };
+    reference?.measure(&sim.world.soft(index).state.x).ok()
 }
 
 /// Contact partners that an object consists of: its colliders, or its soft body.

@@ -12,7 +12,7 @@ use crate::{
     config::{ConfiguredScript, RunConfig},
     error::RunError,
     evaluate::{is_finished, run_suite},
-    policy::PolicyConfig,
+    policy::{PolicyConfig, PolicyOptions, PolicySource},
     suite_run::{PreparedRun, SuiteRun},
     suite_selection::{check_episodes, path_component, select_episodes, select_tasks},
 };
@@ -132,6 +132,7 @@ fn condition_cases(
         shift: Vec::new(),
         set: Vec::new(),
         policy: None,
+        replay: false,
         only: None,
         rigid_twin: false,
     };
@@ -261,15 +262,21 @@ fn compare_conditions(
     runs: Vec<Option<PreparedRun>>,
 ) -> Result<ConditionTable, RunError> {
     let mut marks = MethodMarks { privileged: config.policy.privileged, ..MethodMarks::default() };
-    let mut reference = None;
+    let (mut reference, mut recorded) = (None, None::<PathBuf>);
     let mut rows = Vec::new();
     for (case, run) in cases.iter().zip(runs) {
         let mut outcome = None;
+        let mut repeating = case.config.clone();
+        let run = match (run, case.condition.replay, &recorded) {
+            (Some(run), true, Some(folder)) => Some(repeat(folder, &run, &mut repeating)?),
+            (run, ..) => run,
+        };
         if let Some(run) = run {
             let (name, number) = (text::escape_control(&case.condition.name), rows.len() + 1);
             config.notice(format_args!("{}, {name} ({number} of {})", suite.name, cases.len()));
             let result = run_suite(&run, &mut |_| ())?;
             outcome = Some(ConditionOutcome::new(case.folder.clone(), &result.records, reference.as_deref()));
+            recorded = recorded.or_else(|| run.out.clone());
             reference.get_or_insert(result.records);
             marks.force_observed |= result.summary.force_observed;
             marks.replayed |= result.summary.replayed;
@@ -289,6 +296,18 @@ fn compare_conditions(
     let deformable = suite.object_type == ObjectType::Deformable && !config.rigid_twin;
     let policy = method_label(&config.policy.name, marks);
     Ok(ConditionTable { suite: config.suite_name(suite), policy, deformable, rows })
+}
+
+/// The same run with the actions of the run in `folder` in place of its policy; `config` becomes its configuration.
+fn repeat<'a>(
+    folder: &Path,
+    run: &PreparedRun<'a>,
+    config: &'a mut RunConfig,
+) -> Result<PreparedRun<'a>, RunError> {
+    let policy = PolicySource::Run(folder.to_owned());
+    config.policy = PolicyConfig::load(&PolicyOptions { policy, ..PolicyOptions::default() })?;
+    let again = SuiteRun::new(config, run.loaded, run.suite, run.jobs.clone(), run.split)?;
+    SuiteRun { out: run.out.clone(), ..again }.prepare_like(run)
 }
 
 pub fn document(

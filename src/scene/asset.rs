@@ -79,6 +79,12 @@ impl SoftMaterial {
     /// Range of the strains at which the material changes.
     pub const STRAIN: Range = Range::above(0.0, 1.0).usually(0.002, 0.8);
 
+    /// The same material with `factor` times the resolution.
+    #[must_use]
+    pub fn refined(&self, factor: f64) -> Self {
+        Self { resolution: (factor * self.resolution as f64).round().max(1.0) as usize, ..self.clone() }
+    }
+
     /// Strain up to which the material is stable and undamaged: the smaller of its two limits.
     pub fn stable_strain(&self) -> Option<f64> {
         match (self.collapse_strain, self.damage_strain) {

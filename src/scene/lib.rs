@@ -95,6 +95,18 @@ pub struct Object {
 }
 
 impl Object {
+    /// The same object with `factor` times the resolution of a soft body.
+    #[must_use]
+    pub fn refined(&self, factor: f64) -> Self {
+        let refined = |asset: &Arc<Asset>| match &asset.body {
+            Body::Soft(material) => {
+                Arc::new(Asset { body: Body::Soft(material.refined(factor)), ..Asset::clone(asset) })
+            }
+            _ => asset.clone(),
+        };
+        Self { asset: refined(&self.asset), nominal: refined(&self.nominal), ..self.clone() }
+    }
+
     /// An instance of `asset` as it is, with all joints at rest.
     pub fn new(name: &str, asset: Arc<Asset>, pose_w: Pose) -> Self {
         let joints = asset.parts().iter().map(|part| part.joint.rest()).collect();

@@ -133,6 +133,8 @@ record! {
         set: Option<Table> = Type::Map(&Type::OneOf(&[Type::Number("", Range::ANY), Type::Boolean, Type::Text]));
         /// Built-in policy in place of that of the run: "tactile-servo" (softvt list policies).
         policy: Option<String>;
+        /// True to repeat the actions of the reference, so that only their effect differs.
+        replay: bool => Boolean(false);
         /// object_type of the suites that it applies to; others are not run, and their row says N/A.
         only: Option<ObjectType>;
         /// True to run the rigid twin of the suites: shapes, masses, looks, layouts and prompts stay.

@@ -280,7 +280,8 @@ impl LuaWorld {
         let mut inner = lock(&self.0);
         let model = {
             let _pause = inner.clock.pause();
-            soft_model(name, shape, body).map_err(|e| wrong(&e))?
+            soft_model(name, shape, &body.refined(inner.world.params.mesh_refinement))
+                .map_err(|e| wrong(&e))?
         };
         let reserved = reserve_in_world(lua, model.bytes())?;
         let reference = reference_shape(&model.mesh.nodes, &model, shape).map_err(|e| wrong(&e))?;

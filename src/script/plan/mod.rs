@@ -508,6 +508,7 @@ fn condition(lua: &Lua, list: &Table, spec: &ConditionSpec) -> mlua::Result<Cond
         shift,
         set,
         policy: spec.policy.clone(),
+        replay: spec.replay,
         only: spec.only,
         rigid_twin: spec.rigid_twin,
     })
