@@ -57,7 +57,7 @@ impl DetectionLimits {
     pub(crate) const STEPS_AHEAD: f64 = 1.5;
 
     /// Approach within [`Self::STEPS_AHEAD`] steps at a speed (m/s), m.
-    pub(super) fn approach_distance(&self, speed: f64) -> f64 {
+    pub(crate) fn approach_distance(&self, speed: f64) -> f64 {
         Self::STEPS_AHEAD * self.dt * speed
     }
 }

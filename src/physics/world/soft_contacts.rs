@@ -107,6 +107,28 @@ impl World {
         solid.chain(soft).fold(0.0, f64::max)
     }
 
+    /// Keeps the candidates that may touch in a step of the present length, after a search for those of a longer one.
+    pub(super) fn shorten_candidates(&mut self) {
+        let limits = self.detection_limits();
+        let mut candidates = std::mem::take(&mut self.candidates);
+        let may_touch = |soft: SoftId, group, sample, normal: &Vec3, gap: f64, other: &Vec3| {
+            let own = self.soft(soft).state.sample_velocity(group, sample);
+            gap < limits.margin.max(limits.approach_distance(normal.dot(&(other - own))))
+        };
+        candidates.collider.retain(|found| {
+            let (at, motion) = (&found.candidate, &self.motions[found.collider.index()]);
+            may_touch(found.soft, at.group, at.sample, &at.normal, at.gap, &motion.velocity(&at.p))
+        });
+        candidates.soft.retain(|found| {
+            let (at, other) = (&found.candidate, &self.soft(found.other).state);
+            let nodes = &other.model.mesh.elements[at.contact.element as usize];
+            let other = nodes.iter().zip(at.contact.weights).map(|(&node, w)| other.v[node as usize] * w);
+            let (normal, gap) = (&at.contact.normal, at.contact.gap);
+            may_touch(found.soft, at.group, at.sample, normal, gap, &other.sum())
+        });
+        self.candidates = candidates;
+    }
+
     /// Finds samples near colliders, and marks the nodes that must be retained in the reduced systems.
     pub(super) fn detect_soft_collider(&mut self) {
         self.candidates.collider.clear();

@@ -42,7 +42,7 @@ impl World {
         ((dt / self.part_dt - 1e-9).ceil() as u32).next_power_of_two().min(MAX_PARTS)
     }
 
-    /// Takes the step in equal parts. Prescribed frames and the targets of drives move along with them.
+    /// Takes the step in equal parts. Prescribed frames and the targets of drives move along lines.
     pub(super) fn step_in_parts(&mut self, parts: u32) -> Result<(), StepFailure> {
         let dt = self.params.dt;
         let ends: Vec<Pose> = self.kinematic.iter().map(|frame| frame.next).collect();
@@ -55,8 +55,9 @@ impl World {
             for (moved, ends) in self.articulations.iter_mut().zip(&drives) {
                 moved.move_targets(ends, 1.0 / f64::from(parts - part));
             }
-            // What may touch in the whole step includes what may in its first part.
-            if part > 0 {
+            if part == 0 {
+                self.shorten_candidates();
+            } else {
                 self.count_steps_awake();
                 self.update_collider_motions();
                 self.find_candidates();
@@ -72,9 +73,7 @@ impl World {
         self.report_means();
         Ok(())
     }
-}
 
-impl World {
     /// Share of the whole step for which the present part of it lasts.
     pub(super) fn part_share(&self) -> f64 {
         self.params.dt / self.inputs.0.dt

@@ -1,10 +1,10 @@
 use super::*;
 use crate::{
-    ArticulationId, AttachmentId, BodyId, ColliderId, KinematicId, RigidId, SoftId,
+    ArticulationId, AttachmentId, BodyId, ColliderId, ContactPartner, KinematicId, RigidId, SoftId,
     contact::Friction,
     fem::ElasticMaterial,
     joints::{JointKind, JointTree, Link},
-    world::{JointDrive, KinematicBuilder, RigidBodyBuilder, SoftBodyBuilder},
+    world::{FixedBuilder, JointDrive, KinematicBuilder, RigidBodyBuilder, SoftBodyBuilder},
 };
 use nalgebra::Unit;
 use softvt_geometry::{Mat3, Quat, Vec3, shape::Shape};
@@ -142,9 +142,32 @@ fn a_divided_step_reports_the_means_of_its_parts() {
 }
 
 #[test]
-fn the_first_part_of_a_step_takes_the_candidates_that_divided_it() {
-    let mut world = Press::new().world;
+fn the_first_part_of_a_step_takes_of_its_candidates_those_of_a_search() {
+    let pairs = |world: &World| world.candidates.pairs().collect::<Vec<_>>();
+    let mut world = empty();
+    world.insert(FixedBuilder::ground());
+    let gel = ElasticMaterial::new(3e4, 0.4, 300.0).expect("valid");
+    for height in [0.026, 0.078] {
+        let ball = SoftBodyBuilder::new(Shape::Sphere { radius: 0.025 }, gel).at(0.0, 0.0, height);
+        let ball = world.insert(ball).expect("a ball");
+        world.set_soft_motion(ball, |_, v| *v = Vec3::z() * -10.0 * height);
+    }
     world.begin_step();
+    let mut part = world.clone();
+    part.params.dt /= f64::from(PARTS);
+    let mut searched = part.clone();
+    part.shorten_candidates();
+    searched.find_candidates();
+    assert_eq!(pairs(&part), pairs(&searched));
+    // Some, but not all, of the candidates between the balls and on the ground.
+    let counts = |world: &World| {
+        let is_soft = |pair: &&(SoftId, ContactPartner)| matches!(pair.1, ContactPartner::Soft(_));
+        let (all, soft) = (pairs(world), pairs(world).iter().filter(is_soft).count());
+        [soft, all.len() - soft]
+    };
+    let (few, many) = (counts(&part), counts(&world));
+    assert!((0..2).all(|kind| 0 < few[kind] && few[kind] < many[kind]), "{few:?} of {many:?}");
+    // Nothing searches again.
     world.candidates = Default::default();
     world.step_in_parts(1).expect("a step that converges");
     assert!(world.rows.is_empty(), "found again");
