@@ -56,6 +56,6 @@ return softvt.asset {
     collapse_strain = 0.10,
     damage_strain = 0.35,
   },
-  hints = { grasp_height_m = 19 * mm, carry_pace = 0.5 },
+  hints = { grasp_height_m = 19 * mm, carry_pace = 0.25 },
   visuals = { material.floured(crust, { seed = 15, opacity = 0.25 }) },
 }

@@ -153,6 +153,7 @@
 ---@field shift? table<string, number> Shifts by name, as for --shift: { mass = 1.25 }.
 ---@field set? table<string, number|boolean|string> Settings by path, as for --set: { ["robot.gripper.effort"] = 20 }.
 ---@field policy? string Built-in policy in place of that of the run: "tactile-servo" (softvt list policies).
+---@field replay? boolean True to repeat the actions of the reference, so that only their effect differs. Default false.
 ---@field only? "deformable"|"rigid" object_type of the suites that it applies to; others are not run, and their row says N/A.
 ---@field rigid_twin? boolean True to run the rigid twin of the suites: shapes, masses, looks, layouts and prompts stay. Default false.
 
@@ -688,10 +689,11 @@
 
 ---Settings; those that are left out keep their values. docs/settings.md lists all.
 ---@class softvt.Settings.physics
----@field dt? number Time step. Control runs at 20 Hz independently of it, so it must divide 0.05 s in the benchmark. Limits and grip windows are calibrated with the default. A smaller step damps the motion of soft bodies less; that of the hand does not depend on it. Expects a number in 0.0001..0.05 (s). Default 0.016666666666666666.
+---@field dt? number Time step. Control runs at 20 Hz independently of it, so it must divide 0.05 s in the benchmark. Limits and grip windows are calibrated with the default. Expects a number in 0.0001..0.05 (s). Default 0.016666666666666666.
+---@field mesh_refinement? number Factor on the number of voxels along each edge of soft bodies, which shows how a result depends on the mesh. Expects a number in 0.25..4. Default 1.
 ---@field rayleigh_mass? number Mass-proportional Rayleigh damping of soft bodies (α, as air drag). The paper's engine uses 2.5. Expects a number in 0..1000 (1/s). Default 0.
----@field rayleigh_stiffness? number Stiffness-proportional Rayleigh damping of soft bodies (β). Implicit Euler adds its step: motion is damped by β + `dt`, by default 21.7 ms, so that a smaller step damps less. Equilibria do not depend on it. Expects a number in 0..1 (s). Default 0.005.
----@field average_acceleration? boolean True to integrate soft bodies by average acceleration in place of implicit Euler, whose step damps motion. Expects true or false. Default false.
+---@field rayleigh_stiffness? number Stiffness-proportional Rayleigh damping (β) of soft bodies whose material has no loss factor. Implicit Euler adds its step. Equilibria do not depend on it. Expects a number in 0..1 (s). Default 0.005.
+---@field average_acceleration? boolean True to integrate soft bodies by average acceleration, which adds next to no damping; false for implicit Euler, whose step damps motion. Expects true or false. Default true.
 ---@field dissipation_time? number Dissipation time scale τ_d of contact springs, s (Castro et al. 2022). A surface that recedes faster than the springs relax is released; the value is small compared with `dt`, so that friction does not lift a sliding surface. Expects a number in 0..1 (s). Default 0.005.
 ---@field rigid_modulus? number Normal contact stiffness per area of nearly rigid colliders, Pa/m: near rigid for Young's moduli up to 1 MPa. Expects a number in above 0..1000000000000 (Pa/m). Default 1e9.
 ---@field shear_ratio? number Tangential over normal contact stiffness. Mindlin (1949) gives 0.5 to 0.8 for solids; creep does not depend on it. Expects a number in above 0..10. Default 0.5.
@@ -1024,10 +1026,11 @@ function Body:deformation() end
 ---@return number?
 function Body:stable_strain() end
 
----Returns the compressive strain that `percent` of the volume stays below: 1 − σ_min(F) at the Gauss points, weighted by volume. 95 is usual; a number between 0 and 1 is most likely a share, and an error.
+---Returns the compressive strain that `percent` of the volume stays below: 1 − σ_min(F) at the Gauss points, weighted by volume. 95 is usual; a number between 0 and 1 is most likely a share, and an error. With a `length`, of a voxel or more, the strain of a point is its average within that distance.
 ---@param percent number
+---@param length? number
 ---@return number
-function Body:strain_percentile(percent) end
+function Body:strain_percentile(percent, length) end
 
 ---Returns the share of the volume, %, with a compressive strain above `strain`.
 ---@param strain number

@@ -7,9 +7,9 @@
 -- (scripts/calibration/press.lua). It closes in steps of the width until 5 % of the volume is beyond the stable strain
 -- of the material: the smaller of its collapse_strain and damage_strain. Strains are averaged over 4 mm and found on a
 -- mesh with voxels no larger than that, and at least 18 along the longest edge. D_ref is D at that width, interpolated,
--- and τ = κ D_ref. A press that ends earlier is censored: the file says why, and D_ref is a lower bound. The loose end of the
--- window is the widest width at which five trials with the expert's grasp hold while the pads lift; the tight end is
--- the widest width at which D reaches τ in the press or in those trials.
+-- and τ = κ D_ref. A press that ends earlier is censored: the file says why, and D_ref is a lower bound. The loose end
+-- of the window is the widest width at which five trials with the expert's grasp hold while the pads lift; the tight
+-- end is the widest width at which D reaches τ in the press or in those trials.
 --
 -- --sweep-protocol hand is the sweep of the paper (appendix C.3) with the robot's hand (scripts/calibration/hand.lua):
 -- its D_ref is the largest stable D up to a closed hand.

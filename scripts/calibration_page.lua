@@ -4,7 +4,7 @@ local HEAD = [[
 
 Generated together with `assets/calibration/` by `softvt scripts/calibrate.lua`, which documents the method: a press test of the object
 alone, between two gel pads of the robot at a prescribed width. D_ref is D at the width at which 5 % of the volume is beyond the *stable
-strain* of the material, and τ = κ D_ref. Each object is safe at widths between the *loose* end, up to which friction carries it,
+strain* of the material, averaged over 4 mm and on a mesh with voxels of at most 4 mm, and τ = κ D_ref. Each object is safe at widths between the *loose* end, up to which friction carries it,
 and the *tight* end, at which D reaches τ, pressed on the table or carried. Forces are those per pad at rest. *Carried D* is the smallest
 peak of D while the object was lifted and held; an object with a carried D above τ cannot be carried safely, whatever the grip.
 A press that ended before the stable strain gives a lower bound of D_ref (≥).

@@ -1,5 +1,6 @@
--- Where the collapse and damage strains of the soft assets come from, for docs/assets.md. The values themselves are in
--- the assets. `collapse` and `damage` are the ranges in which the true values are thought to lie.
+-- Where the collapse and damage strains and the loss factors of the soft assets come from, for docs/assets.md. The
+-- values themselves are in the assets. `collapse` and `damage` are the ranges in which the true values are thought to
+-- lie.
 local crumb = "crumb: cell walls buckle at 0.05–0.15 (1, 2, 5)"
 local elastomer = "elastomer foam: 0.05 in theory, 0.05–0.10 in tests (5)"
 local sources = {
@@ -125,6 +126,25 @@ No full paper was read for these values: abstracts, tables and excerpts only. *R
     (remembered). No modulus or yield strain of puff pastry was found.
 11. ASTM D3574, through a test maker's page: flexible polyurethane keeps a set of at most 10 % of a squeeze to one half.
 12. A materials catalogue: silicone foam of 240 to 560 kg/m³ keeps a set below 25 % of a squeeze to one half.
+
+Loss factors (tan δ at small strains, 1 to 10 Hz) have three levels; the differences within them are not known.
+
+| material | loss factor | plausible | source |
+|---|---:|---|---|
+| baked crumb, sponge | 0.20 | 0.10–0.35 | none measured was found: between starch gel (0.05 to 0.2, remembered) and gluten (0.28, 13). Stale crumb loses no less than fresh (14) |
+| flaky pastry | 0.15 | 0.05–0.30 | none found; crisp crust about 0.05, moist layers as crumb |
+| polyurethane foam | 0.15 | 0.06–0.25 | 0.17 at 1 Hz (15); 0.08 to 0.10 of closed cells (16); rebound of 50 to 60 % (17) gives 0.16 to 0.22 |
+| silicone foam | 0.10 | 0.04–0.20 | as the rubber: a beam of silicone in `tests/reference/measured` has 0.107 at 7.7 Hz, 0.116 at 4.3 Hz |
+| for comparison: wheat dough | 0.40 | 0.28–0.50 | a power law of exponent 0.27 (13, remembered), 0.1 to 10 Hz |
+| gelatin, agar | 0.05 | 0.02–0.3 | G′ ∝ ω^0.02 gives 0.03; other values without a source |
+| natural rubber | 0.05–0.10 | 0.02–0.15 | handbook values, frequency not given |
+
+13. Ng, McKinley, Padmanabhan (2006), report HML 06-P-08, and Ng, McKinley (2008), *J Rheol* 52:417 (exponents remembered): dough and gluten
+    are critical gels with a broad power law.
+14. Persaud, Faubion, Ponte (1990), *Cereal Chem* 67:182: reheating aged crumb reduced its loss tangent to that of fresh crumb.
+15. Ge, Rice (2018), *Polymer Testing* 72:187, quoted in public code.
+16. Data sheets of Sylodyn ND and NF (Getzner), DIN 53513.
+17. Polyurethane Foam Association, *InTouch* 11(1), 2016.
 ]],
 }
 return sources

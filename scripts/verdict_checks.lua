@@ -1,5 +1,5 @@
--- How many verdicts of a suite turn with the time step and with the mesh of the soft bodies: the same episodes at 120 and
--- 240 Hz, and with the actions of the reference on a mesh 1.5 times as fine. Limits stay.
+-- How many verdicts of a suite turn with the time step and with the mesh of the soft bodies: the same episodes at 120
+-- and 240 Hz, and with the actions of the reference on a mesh 1.5 times as fine. Limits stay.
 --
 --   softvt scripts/verdict_checks.lua --suite object_hidden --policy tactile-servo --episodes 20
 local opt = softvt.options {

@@ -14,12 +14,10 @@ pub fn rigid(report: &mut Report) {
     );
     let [speed, way] = rigid::fall();
     println!(
-        "Free fall of 1 s: speed off by {speed:.1e}, way by {}, of which half a step of speed ({}) is the scheme's.\n",
-        percent(way),
-        percent(1.0 / 60.0)
+        "Free fall of 1 s: speed off by {speed:.1e}, way by {way:.1e}; the speed is that of the middle of the last step.\n"
     );
     report.claim("free fall: speed", [speed], 1e-7);
-    report.claim("free fall: way, less half a step of speed", [way - 1.0 / 60.0], 1e-6);
+    report.claim("free fall: way", [way], 1e-6);
     slopes(report);
     let [moved, turned] = rigid::stack();
     println!("Stack of five boxes, 10 s: moved by {moved:.1e} m, turned by {turned:.1e} rad at most.");
@@ -41,7 +39,7 @@ pub fn rigid(report: &mut Report) {
     header("largest gain of energy in a step | of the initial energy");
     for (name, gain) in rigid::largest_gains() {
         row!("{name} | {gain:.1e}");
-        report.claim(&format!("energy gained in a step: {name}"), [gain.max(0.0)], 1e-3);
+        report.claim(&format!("energy gained in a step: {name}"), [gain.max(0.0)], 2e-3);
     }
 }
 

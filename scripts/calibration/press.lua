@@ -204,8 +204,8 @@ local function find_contact(bench, step)
   return bench.width
 end
 
--- Presses from first contact inward in steps of `step` (m) until `is_last(row, bench)` or the press is no longer stable.
--- Returns the rows, and why the press ended if they do not tell.
+-- Presses from first contact inward in steps of `step` (m) until `is_last(row, bench)` or the press is no longer
+-- stable. Returns the rows, and why the press ended if they do not tell.
 local function press_in(bench, step, is_last)
   local rows, index = {}, nil
   local width, ended = find_contact(bench, CONTACT_STEP)
@@ -223,10 +223,10 @@ local function press_in(bench, step, is_last)
 end
 
 -- Resolution at which voxels are no larger than STRAIN_LENGTH, so that strains and forces have converged.
-local function fine_resolution(asset, change)
+function press.fine_resolution(asset, change)
   local low, high = asset.shape:bounds()
   local longest = math.max(high[1] - low[1], high[2] - low[2], high[3] - low[3])
-  local needed = math.ceil((change.scale or 1) * longest / STRAIN_LENGTH)
+  local needed = math.ceil((change and change.scale or 1) * longest / STRAIN_LENGTH)
   return math.max(FINE, needed, asset.body.resolution)
 end
 
@@ -239,20 +239,23 @@ local function at_resolution(change, resolution)
   return copy
 end
 
--- Strain over D of a press on a fine mesh, up to the stable strain: a list of { d_pct, strain }, whose field `ended` says
--- why it ended before, if it did. The strain is the 95th percentile of the volume, each point's averaged over
+-- Strain over D of a press on a fine mesh, up to the stable strain: a list of { d_pct, strain }, whose field `ended`
+-- says why it ended before, if it did. The strain is the 95th percentile of the volume, each point's averaged over
 -- STRAIN_LENGTH. nil if the material has no stable strain. It does not depend on the stiffness.
 function press.strains(asset, change)
   change = change or {}
-  local fine = at_resolution(change, change.fine or fine_resolution(asset, change))
+  local fine = at_resolution(change, change.fine or press.fine_resolution(asset, change))
   local bench, problem, stable_strain = press.bench(asset, fine)
   if not stable_strain then return nil end
-  local found = { { d_pct = 0, strain = 0 }, ended = problem }
-  if not bench then return found end
+  if not bench then return { ended = problem } end
+  local function strain() return bench.body:strain_percentile(PERCENTILE, STRAIN_LENGTH) end
+  -- The weight alone strains the body.
+  local found = { { d_pct = 0, strain = strain() } }
+  if found[1].strain >= stable_strain then return { found[1], { d_pct = 1, strain = found[1].strain } } end
   local _, ended = press_in(bench, FINE_STEP, function(row)
     local last = found[#found]
     if row.stable and row.d_pct > last.d_pct then
-      last = { d_pct = row.d_pct, strain = bench.body:strain_percentile(PERCENTILE, STRAIN_LENGTH) }
+      last = { d_pct = row.d_pct, strain = strain() }
       found[#found + 1] = last
     end
     return last.strain >= stable_strain
@@ -271,11 +274,11 @@ local function strain_at(list, d_pct)
   return low.strain + (d_pct - low.d_pct) / (high.d_pct - low.d_pct) * (high.strain - low.strain)
 end
 
--- Presses in steps of `step` (m) until 5 % of the volume has passed the stable strain, or the press is no longer stable.
--- Returns { rows, stable_strain, ended, tilt_deg }: `ended` says why the sweep ended if the rows do not tell, `tilt_deg`
--- by how much the object has tilted while it settled, if it has. Widths, forces and D are those on the mesh of episodes.
--- The strain of a row is that of a fine mesh (of resolution `change.fine`) at the same D, as it converges far later:
--- that of `strains`, which are found if they are not given.
+-- Presses in steps of `step` (m) until 5 % of the volume has passed the stable strain, or the press is no longer
+-- stable. Returns { rows, stable_strain, ended, tilt_deg }: `ended` says why the sweep ended if the rows do not tell,
+-- `tilt_deg` by how much the object has tilted while it settled, if it has. Widths, forces and D are those on the mesh
+-- of episodes. The strain of a row is that of a fine mesh (of resolution `change.fine`) at the same D, as it converges
+-- far later: that of `strains`, which are found if they are not given.
 function press.sweep(asset, step, change, strains)
   change = change or {}
   local bench, problem, stable_strain = press.bench(asset, change)
@@ -290,7 +293,7 @@ function press.sweep(asset, step, change, strains)
     return sweep
   end
   local known = strains or press.strains(asset, change)
-  if #known == 1 then
+  if #known < 2 then
     sweep.ended = known.ended
     return sweep
   end

@@ -124,8 +124,8 @@ impl VolumeProduct {
     }
 }
 
-/// `∫ N_a N_b dV` over the filled part of a voxel of edge `h`: by the Gauss rule of two points per axis, which is exact,
-/// or over the sub-cells.
+/// `∫ N_a N_b dV` over the filled part of a voxel of edge `h`: by the Gauss rule of two points per axis, which is
+/// exact, or over the sub-cells.
 fn element_product(h: f64, fill: &OccupancyMask) -> [[f64; 8]; 8] {
     let points: Vec<(Vec3, f64)> = if *fill == OccupancyMask::full() {
         hex8::gauss_points().map(|xi| (xi, h.powi(3) / 8.0)).to_vec()

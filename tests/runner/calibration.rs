@@ -165,7 +165,9 @@ fn a_calibration_is_checked_for_the_object_that_was_calibrated() {
     }
     let d_ref = |check: &str| row(check)["d_ref_pct"].as_f64().expect("D_ref");
     assert!((d_ref("half_step") / d_ref("nominal") - 1.0).abs() < 0.05);
-    assert_ne!(d_ref("resolution_6"), d_ref("resolution_12"));
+    assert!((d_ref("finer") / d_ref("nominal") - 1.0).abs() < 0.05);
+    let force = |check: &str| row(check)["force_end_n"].as_f64().expect("a force");
+    assert!((force("nominal") / force("converged") - 1.0).abs() < 0.2);
     assert_eq!((&row("loose_outside")["held"], &row("tight_inside")["held"]), (&0.into(), &1.into()));
     let softer = project.text("assets/brick.lua").replace("4e4", "1e4");
     project.write("assets/brick.lua", softer.as_bytes());

@@ -184,7 +184,7 @@ mod tests {
     fn the_beam_swings_as_recorded_at_any_step() {
         for case in CASES {
             let recorded = case.recorded();
-            for (across, rate) in [(ACROSS, 60.0), (3, 120.0), (3, 240.0)] {
+            for (across, rate) in [(ACROSS, 60.0), (ACROSS, 120.0)] {
                 let found = case.simulated(across, rate, Law::LossFactor);
                 let off = |value: f64, recorded: f64| (value / recorded - 1.0).abs();
                 let is_close = off(found.sag_mm, recorded.sag_mm) < 0.05

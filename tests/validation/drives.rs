@@ -7,8 +7,6 @@ use softvt::{
     rollout::{ArmCommand, RobotInstance},
 };
 
-use serde::Deserialize;
-
 use crate::{bodies::GRAVITY, support::quintic};
 
 /// Physics steps per second.
@@ -50,26 +48,6 @@ pub fn hand_acceleration(rate: f64) -> f64 {
     path.windows(3).map(|p| (p[2] - 2.0 * p[1] + p[0]).norm() * rate * rate).fold(0.0, f64::max)
 }
 
-/// A controller in a suite at a rate of physics steps, and the verdicts that differ from those at the first rate.
-#[derive(Debug, Deserialize)]
-pub struct VerdictRow {
-    pub suite: String,
-    pub controller: String,
-    pub rate_hz: u32,
-    pub episodes: u32,
-    /// Goal Success, %.
-    pub goal: f64,
-    /// Safety Success, %.
-    pub safety: f64,
-    pub goal_turned: u32,
-    pub safety_turned: u32,
-}
-
-/// The rows that `.ci/time-steps` wrote.
-pub fn verdicts() -> Vec<VerdictRow> {
-    serde_json::from_str(include_str!("time_steps.json")).expect("rows of verdicts")
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -81,22 +59,5 @@ mod tests {
             (found.iter().fold(f64::MAX, |a, &b| a.min(b)), found.iter().fold(0.0, |a: f64, &b| a.max(b)));
         assert!(most <= 1.2 * least, "{found:?} m/s² at {RATES:?} Hz");
         assert!(most <= 2.0 * path_acceleration(), "{found:?} m/s², the path {}", path_acceleration());
-    }
-
-    #[test]
-    fn safety_of_the_expert_does_not_depend_on_the_physics_step() {
-        let rows = verdicts();
-        for row in &rows {
-            let of_row = |first: &&VerdictRow| {
-                [&first.suite, &first.controller] == [&row.suite, &row.controller] && first.rate_hz == 60
-            };
-            let first = rows.iter().find(of_row).expect("a row");
-            let share = |turned: u32| 100.0 * f64::from(turned) / f64::from(row.episodes);
-            let [goal, safety] = [row.goal - first.goal, row.safety - first.safety].map(f64::abs);
-            let consistent =
-                goal <= share(row.goal_turned) + 1e-9 && safety <= share(row.safety_turned) + 1e-9;
-            assert!(consistent, "{row:?}, at first {first:?}");
-            assert!(row.controller != "expert" || safety <= 2.0, "{row:?}, at first {first:?}");
-        }
     }
 }

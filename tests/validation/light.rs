@@ -39,8 +39,10 @@ mod tests {
                 assert_eq!(ours.holds, ratio > 1.0, "gap {gap}, dt {dt}: capacity ratio {ratio:.3}");
             }
             if ours.holds {
-                let peak = ours.d_peak_pct / ours.d_hold_pct;
-                assert!(peak <= 1.1, "gap {gap}, dt {dt}: D_peak is {peak:.3} of D_hold");
+                // A load that comes at once swings by as much as it changes D, if nothing damps it; slip adds to that.
+                let change = (ours.d_hold_pct - ours.d_grip_pct).abs();
+                let peak = (ours.d_peak_pct - ours.d_hold_pct) / change.max(0.05 * ours.d_hold_pct);
+                assert!(peak <= 1.25, "gap {gap}, dt {dt}: D overshoots by {peak:.3} of its change");
                 assert!(ours.ripple < 1e-3, "gap {gap}, dt {dt}: force ripples by {:.1e}", ours.ripple);
             }
         }

@@ -23,3 +23,4 @@ mod statics;
 mod support;
 mod time_step;
 mod truth;
+mod verdicts;

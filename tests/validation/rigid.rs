@@ -32,15 +32,16 @@ fn position(world: &World, body: RigidId) -> Vec3 {
     world.rigid(body).state.pose_w.translation.vector
 }
 
-/// Relative errors of speed and way after a free fall of one second: the solver stops at its tolerance, and positions
-/// are half a step of speed ahead.
+/// Relative errors of speed and way after a free fall of one second.
 pub fn fall() -> [f64; 2] {
     let mut world = world();
     let body = rigid(&mut world, &cuboid(0.05, 0.06, 0.07), 0.3, Pose::identity(), friction(MU.0, MU.1));
     world.rigid_mut(body).state.w = Vec3::new(1.0, 2.0, 3.0);
     run(&mut world, 1.0);
     let way = -position(&world, body).z;
-    [-world.rigid(body).state.v.z / GRAVITY - 1.0, way / (0.5 * GRAVITY) - 1.0]
+    // The velocity is that of the middle of the last step.
+    let at = 1.0 - 0.5 * world.params.dt;
+    [-world.rigid(body).state.v.z / (GRAVITY * at) - 1.0, way / (0.5 * GRAVITY) - 1.0]
 }
 
 /// Acceleration along x between 0.2 s and 0.5 s.
@@ -271,12 +272,17 @@ pub fn largest_gains() -> Vec<(&'static str, f64)> {
 
 fn largest_gain(mut world: World) -> f64 {
     let start = world.energy().total();
-    let (mut last, mut most) = (start, f64::NEG_INFINITY);
-    for _ in 0..180 {
+    let (mut before, mut last, mut most) = (world.energy(), None, f64::NEG_INFINITY);
+    for step in 0..180 {
         world.step().expect("a step that converges");
-        let now = world.energy().total();
-        most = most.max((now - last) / start);
-        last = now;
+        // Velocities are those of the middle of the steps, so kinetic energy at the end of one is a mean.
+        let after = world.energy();
+        let now = before.total() + 0.5 * (after.kinetic - before.kinetic);
+        // The first is not one: the given velocities are those at the start.
+        if let Some(last) = last.filter(|_| step > 1) {
+            most = most.max((now - last) / start);
+        }
+        (before, last) = (after, Some(now));
     }
     most
 }
@@ -286,9 +292,9 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_falling_body_has_the_speed_of_the_closed_form_and_its_path_to_first_order() {
+    fn a_falling_body_has_the_speed_and_the_way_of_the_closed_form() {
         let [speed, way] = fall();
-        assert!(speed.abs() < 1e-7 && (way - 1.0 / 60.0).abs() < 1e-6, "{speed} {way}");
+        assert!(speed.abs() < 1e-7 && way.abs() < 1e-6, "{speed} {way}");
     }
 
     #[test]
@@ -331,7 +337,8 @@ mod tests {
     #[test]
     fn no_step_gains_energy() {
         for (name, gain) in largest_gains() {
-            assert!(gain < 1e-3, "{name}: {gain}");
+            // In an impact, the mean of the kinetic energies before and after stands for that at the end of the step.
+            assert!(gain < 2e-3, "{name}: {gain}");
         }
     }
 }

@@ -106,7 +106,7 @@ impl Default for Squeeze {
             density: 300.0,
             friction: 1.2,
             beta: 2e-3,
-            average_acceleration: false,
+            average_acceleration: true,
             dt: 1.0 / 60.0,
             pad: 0.022,
             pad_offset: [0.0; 2],

@@ -1,23 +1,23 @@
 //! Rest stiffness of one voxel: a trilinear hexahedron with incompatible modes.
 //!
-//! A trilinear hexahedron is too stiff in bending. Three quadratic displacements that end at its faces,
-//! `a_k (ξ_k − c_k)²` with any vectors `a_k`, remove that (Wilson, Taylor, Doherty & Ghaboussi, "Incompatible displacement
-//! models", 1973). Their gradients have no mean over the material, whose centre is `c`, so that a homogeneous strain
-//! stays exact (Taylor, Beresford & Wilson, "A non-conforming element for stress analysis", Int. J. Numer. Meth. Eng. 10,
-//! 1976). They are eliminated from the stiffness, once for each fill, and cost nothing in a step. The dilatation is
-//! projected on the linear functions over the material, as they can make it vanish in an incompressible material, where
-//! products of coordinates would lock (B-bar: Hughes, *The Finite Element Method*, 1987, §4.5).
+//! A trilinear hexahedron is too stiff in bending. Three quadratic displacements that end at its faces, `a_k (ξ_k −
+//! c_k)²` with any vectors `a_k`, remove that (Wilson, Taylor, Doherty & Ghaboussi, "Incompatible displacement models",
+//! 1973). Their gradients have no mean over the material, whose centre is `c`, so that a homogeneous strain stays exact
+//! (Taylor, Beresford & Wilson, "A non-conforming element for stress analysis", Int. J. Numer. Meth. Eng. 10, 1976).
+//! They are eliminated from the stiffness, once for each fill, and cost nothing in a step. The dilatation is projected
+//! on the linear functions over the material, as they can make it vanish in an incompressible material, where products
+//! of coordinates would lock (B-bar: Hughes, *The Finite Element Method*, 1987, §4.5).
 //!
 //! A full voxel is integrated with 2×2×2 Gauss points; a partly filled one at the centres of its filled sub-cells. So
-//! that an almost empty voxel stays regular, it also has [`GHOST`] of what resists all but homogeneous strains in a full
-//! one: the difference of 2×2×2 points and a single one (hourglass stiffness: Flanagan & Belytschko, Int. J. Numer. Meth.
-//! Eng. 17, 1981).
+//! that an almost empty voxel stays regular, it also has [`GHOST`] of what resists all but homogeneous strains in a
+//! full one: the difference of 2×2×2 points and a single one (hourglass stiffness: Flanagan & Belytschko, Int. J.
+//! Numer. Meth. Eng. 17, 1981).
 
-use nalgebra::{SMatrix, SVector, Vector4};
+use nalgebra::{SMatrix, Vector4};
 
 use super::material::ElasticMaterial;
 use softvt_geometry::{
-    Mat3, Vec3, hex8,
+    Vec3, hex8,
     voxel::{OccupancyMask, SUBCELLS},
 };
 
@@ -102,12 +102,13 @@ pub fn stiffness(h: f64, fill: &OccupancyMask, material: &ElasticMaterial) -> St
         let mut g = [Vec3::zeros(); MODES];
         g[..8].copy_from_slice(&hex8::gradients(xi, h));
         (0..3).for_each(|axis| g[8 + axis][axis] = 2.0 * away[axis] / h);
-        let g = SMatrix::<f64, 3, MODES>::from_columns(&g);
         products += linear * linear.transpose() * *weight;
-        dilatations +=
-            linear * SVector::<f64, FREEDOMS>::from_column_slice(g.as_slice()).transpose() * *weight;
+        for (mut column, slope) in dilatations.column_iter_mut().zip(g.iter().flatten()) {
+            column += linear * (weight * slope);
+        }
         add_deviatoric(&mut all, &g, weight * mu);
     }
+    all.fill_upper_triangle_with_lower_triangle();
     if let Some(inverse) = products.try_inverse() {
         all += dilatations.transpose() * inverse * dilatations * bulk;
     }
@@ -123,15 +124,18 @@ pub fn stiffness(h: f64, fill: &OccupancyMask, material: &ElasticMaterial) -> St
     stiffness
 }
 
-/// Adds `w 2 dev ε : dev ε` for the gradients `g` of the modes at a point, with `w` the shear modulus times its volume.
-fn add_deviatoric(k: &mut SMatrix<f64, FREEDOMS, FREEDOMS>, g: &SMatrix<f64, 3, MODES>, w: f64) {
-    for a in 0..MODES {
-        for b in 0..MODES {
-            let (g_a, g_b) = (g.column(a), g.column(b));
-            let outer = g_a * g_b.transpose();
-            let block = (Mat3::identity() * g_a.dot(&g_b) + outer.transpose() - outer * (2.0 / 3.0)) * w;
-            let mut sum = k.fixed_view_mut::<3, 3>(3 * a, 3 * b);
-            sum += block;
+/// Adds the lower blocks of `w 2 dev ε : dev ε` for the gradients `g` of the modes at a point, with `w` the shear
+/// modulus times its volume.
+fn add_deviatoric(k: &mut SMatrix<f64, FREEDOMS, FREEDOMS>, g: &[Vec3; MODES], w: f64) {
+    for (b, g_b) in g.iter().enumerate() {
+        for (a, g_a) in g.iter().enumerate().skip(b) {
+            let dot = w * g_a.dot(g_b);
+            for j in 0..3 {
+                for i in 0..3 {
+                    let mixed = w * (g_a[j] * g_b[i] - 2.0 / 3.0 * g_a[i] * g_b[j]);
+                    k[(3 * a + i, 3 * b + j)] += if i == j { dot + mixed } else { mixed };
+                }
+            }
         }
     }
 }
@@ -139,6 +143,7 @@ fn add_deviatoric(k: &mut SMatrix<f64, FREEDOMS, FREEDOMS>, g: &SMatrix<f64, 3, 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use softvt_geometry::Mat3;
 
     fn apply(k: &Stiffness, u: &[f64; 24]) -> [f64; 24] {
         std::array::from_fn(|r| (0..24).map(|c| k[c * 24 + r] * u[c]).sum())

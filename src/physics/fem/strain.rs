@@ -170,8 +170,8 @@ impl StrainMeter {
     ///
     /// The strain of a point is its mean over the material within `length` (m) of it at rest, with the bell-shaped
     /// weight `(1 − r²/length²)²`: non-local, as that of damage models (Pijaudier-Cabot & Bažant, Nonlocal damage
-    /// theory, J. Eng. Mech. 113, 1987; weight: Bažant & Jirásek, J. Eng. Mech. 128, 2002). The local one, with `length`
-    /// 0, is singular at the edge of a pad, and its percentiles depend on the voxels.
+    /// theory, J. Eng. Mech. 113, 1987; weight: Bažant & Jirásek, J. Eng. Mech. 128, 2002). The local one, with
+    /// `length` 0, is singular at the edge of a pad, and its percentiles depend on the voxels.
     pub fn percentile(&self, state: &FemState, tail: f64, length: f64) -> f64 {
         let mesh = &state.model.mesh;
         let local: Vec<[f64; POINTS]> = (0..self.share.len())
