@@ -1,5 +1,5 @@
 -- Grasps an object as the expert does, closes the hand to `closure` at once, and waits half a second. Returns the
--- fastest node of the 0.2 s that follow.
+-- fastest node of the 0.2 s that follow, and by how much D changes in them, %.
 local grasp = require "experts.grasp"
 local table_top = require "assets.table"
 local function held(name)
@@ -28,13 +28,16 @@ return softvt.experiment {
       arm:wait(0.5)
     end))
     local row = { asset = point.asset, mm_s = 0, det_f = 1, force_n = 0 }
+    local least, most = math.huge, 0
     for _ = 1, 4 do
       assert(sim:wait(0.05))
       local seen = sim:measure "object"
       row.mm_s = math.max(row.mm_s, 1e3 * seen.speed)
       row.det_f = math.min(row.det_f, seen.min_det_f)
       row.force_n = math.min(table.unpack(seen.pad_force))
+      least, most = math.min(least, seen.d_pct), math.max(most, seen.d_pct)
     end
+    row.change_pct = 100 * (most / least - 1)
     return row
   end,
 }

@@ -87,12 +87,14 @@ fn the_pads_press_with_the_force_of_a_grasp_on_average() {
 }
 
 #[test]
-fn standard_objects_neither_chatter_nor_turn_inside_out_in_a_shut_hand() {
+fn standard_objects_rest_and_do_not_turn_inside_out_in_a_shut_hand() {
     let rows = Project::of("shut_hand.lua").run("x.lua").rows();
     assert_eq!(rows.len(), 3);
     for row in rows {
-        let [speed, det_f, force] = ["mm_s", "det_f", "force_n"].map(|key| number(&row, key));
-        assert!(speed < 5.0 && det_f > 0.1 && force > 10.0, "{row:?}");
+        let [speed, change, det_f, force] =
+            ["mm_s", "change_pct", "det_f", "force_n"].map(|key| number(&row, key));
+        // Single outer nodes ring, which docs/validation.md says; D does not show it.
+        assert!(speed < 200.0 && change < 0.1 && det_f > 0.1 && force > 10.0, "{row:?}");
     }
 }
 
