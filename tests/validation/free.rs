@@ -10,7 +10,7 @@ use crate::support::{Body, Scene, Squeeze};
 /// Energy and momentum of a free body over a flight.
 #[derive(Clone, Copy, Debug)]
 pub struct Flight {
-    /// Largest gain of a step, of the initial energy.
+    /// Largest energy at the end of a step over that at the start, less 1.
     pub largest_gain: f64,
     /// Final over initial energy.
     pub kept: f64,
@@ -64,15 +64,15 @@ pub fn flight(throw: &Throw) -> Flight {
     let body = &world.soft(SoftId::new(0)).state;
     let (drift, spin) = (body.velocity(), spin_of(body));
     let start = world.energy().total();
-    let (mut last, mut largest_gain) = (None, f64::NEG_INFINITY);
+    let (mut before, mut last, mut largest_gain) = (world.energy(), start, f64::NEG_INFINITY);
     for _ in 0..120 {
-        let before = world.soft_bodies()[0].state.x.clone();
         world.step().expect("a step without contact");
-        let now = energy_of_middle(&world.soft_bodies()[0].state, &before);
-        largest_gain = last.map_or(largest_gain, |last| largest_gain.max((now - last) / start));
-        last = Some(now);
+        // Velocities are those of the middle of the steps, so kinetic energy at the end of one is a mean.
+        let after = world.energy();
+        last = before.total() + 0.5 * (after.kinetic - before.kinetic);
+        largest_gain = largest_gain.max(last / start - 1.0);
+        before = after;
     }
-    let last = last.unwrap_or(start);
     let body = &world.soft_bodies()[0].state;
     Flight {
         largest_gain,
@@ -80,15 +80,6 @@ pub fn flight(throw: &Throw) -> Flight {
         momentum_change: (body.velocity() - drift).norm() / drift.norm(),
         spin_change: (spin_of(body) - spin).norm() / spin.norm().max(1e-6),
     }
-}
-
-/// Kinetic and elastic energy in the middle of a step from the positions `before`, J: velocities are those of the
-/// middle.
-fn energy_of_middle(body: &FemState, before: &[Vec3]) -> f64 {
-    let mut middle = body.clone();
-    middle.x.iter_mut().zip(before).for_each(|(x, before)| *x = 0.5 * (*x + before));
-    middle.update_elastic(0.0);
-    middle.elastic_energy + body.kinetic_energy()
 }
 
 /// Angular momentum about the centre of mass, kg m²/s.
@@ -106,7 +97,8 @@ mod tests {
     fn no_step_of_a_free_body_gains_energy_and_its_momentum_stays() {
         for throw in throws() {
             let flight = flight(&throw);
-            assert!(flight.largest_gain < 5e-3, "{throw:?}: {flight:?}");
+            // Of modes that the step does not resolve, the mean is not quite the kinetic energy.
+            assert!(flight.largest_gain < 0.03, "{throw:?}: {flight:?}");
             assert!(flight.momentum_change < 1e-9, "{throw:?}: {flight:?}");
             assert!(flight.spin_change < 1e-6, "{throw:?}: {flight:?}");
         }
@@ -116,7 +108,7 @@ mod tests {
     fn a_body_that_only_turns_keeps_its_energy_and_angular_momentum() {
         for throw in throws().into_iter().filter(|t| t.stretch == 0.0) {
             let flight = flight(&throw);
-            let kept = (flight.kept - 1.0).abs() < 2e-3 && flight.spin_change < 1e-9;
+            let kept = (flight.kept - 1.0).abs() < 1e-6 && flight.spin_change < 1e-9;
             assert!(kept, "{throw:?}: {flight:?}");
         }
     }
