@@ -1,4 +1,4 @@
-"""Runs of the hidden suites by a controller, for search-trials and time-steps."""
+"""Runs of the hidden suites by a controller, for search-trials."""
 
 import json
 import os
