@@ -90,8 +90,9 @@ local CHANGES = {
   { name = "scale_1.1", scale = 1.1 },
 }
 
--- D (%) and force (N) of the rows of a sweep at a width, mm; nil beyond them.
+-- D (%) and force (N) of the rows of a sweep at a width, mm; nil beyond them or without a width.
 local function at_width(rows, width)
+  if not width then return nil end
   for k = 2, #rows do
     local wide, narrow = rows[k - 1], rows[k]
     if wide.width_mm >= width and narrow.width_mm <= width then
@@ -115,8 +116,8 @@ local function numerics(point, o)
     sweep = sweep.rows,
     holds = {},
   }
-  local d_tight_pct, force_tight_n = at_width(sweep.rows, known.window.tight.width_mm)
-  local d_end_pct, force_end_n = at_width(sweep.rows, known.width_at_d_ref_mm)
+  local d_tight_pct, force_tight_n = at_width(sweep.rows, known and known.window.tight.width_mm)
+  local d_end_pct, force_end_n = at_width(sweep.rows, known and known.width_at_d_ref_mm)
   return {
     asset = point.asset,
     check = point.change.name,

@@ -39,7 +39,6 @@ of `scripts/variations/hidden.lua`; the share of the draws that is kept is that 
 The same instances are then carried by the robot's hand, with the grasp and the motion of the expert, and the grip force per pad is bisected.
 The loose end is the least force that carries the object with at most 2 mm of slip, the tight end the largest with which D stays within
 τ. The last columns have both over those of the window by the calibration: the median, the smallest and the largest.
-All numbers were made with softvt 0.3.0 and earlier, whose meshes, limits and instances differ.
 
 ]]
 

@@ -241,7 +241,8 @@ end
 
 -- Strain over D of a press on a fine mesh, up to the stable strain: a list of { d_pct, strain }, whose field `ended`
 -- says why it ended before, if it did. The strain is the 95th percentile of the volume, each point's averaged over
--- STRAIN_LENGTH. nil if the material has no stable strain. It does not depend on the stiffness.
+-- STRAIN_LENGTH. nil if the material has no stable strain. It hardly depends on the stiffness: from 0.3 to 30 times
+-- that of the cube, D at the stable strain changes by 0.9 %.
 function press.strains(asset, change)
   change = change or {}
   local fine = at_resolution(change, change.fine or press.fine_resolution(asset, change))

@@ -6,9 +6,9 @@
 //!
 //! Quantities, as SoftVTBench defines them:
 //!
-//! - **D**, % of the diagonal of the settled bounding box: root mean square distance of a body's nodes from their
-//!   settled places after the best rigid fit ([`deformation`], metric [`deformation::METRIC_ID`]). **D_peak** is the
-//!   maximum of the target's D over all physics steps of an episode.
+//! - **D**, % of the diagonal of the object's bounding box as modelled: root mean square distance, over the volume, of
+//!   a body from its settled shape after the best rigid fit ([`deformation`], metric [`deformation::METRIC_ID`]).
+//!   **D_peak** is the maximum of the target's D over all physics steps of an episode.
 //! - **D_ref**, %: largest D of a stable squeeze in the compression sweep of an asset ([`calibration`]).
 //! - **κ**, 0 to 1: share of D_ref that an episode may use; 0.5 in the benchmark ([`safety::NOMINAL_KAPPA`]), and also
 //!   reported for 0.3 and 0.7 (appendix C.3).

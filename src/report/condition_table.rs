@@ -68,6 +68,9 @@ pub struct ConditionRow {
     /// Policy in place of the reference's; absent for the same.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub policy: Option<String>,
+    /// True if the actions of the reference were repeated in place of a policy.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    pub replay: bool,
     /// True if the policy keeps one number constant, by what shows of an object.
     #[serde(skip_serializing_if = "std::ops::Not::not")]
     pub blind: bool,

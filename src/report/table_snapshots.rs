@@ -181,6 +181,7 @@ fn condition(name: &str, outcome: Option<ConditionOutcome>) -> ConditionRow {
         shift: Vec::new(),
         set: Vec::new(),
         policy: None,
+        replay: false,
         blind: false,
         not_applicable: outcome.is_none().then(|| "nothing in it deforms".to_owned()),
         outcome,

@@ -279,7 +279,7 @@ fn compare_conditions(
             recorded = recorded.or_else(|| run.out.clone());
             reference.get_or_insert(result.records);
             marks.force_observed |= result.summary.force_observed;
-            marks.replayed |= result.summary.replayed;
+            marks.replayed |= result.summary.replayed && !case.condition.replay;
             marks.privileged |= result.summary.privileged;
         }
         rows.push(ConditionRow {
@@ -288,6 +288,7 @@ fn compare_conditions(
             shift: case.condition.shift.clone(),
             set: case.condition.set.clone(),
             policy: case.condition.policy.clone(),
+            replay: case.condition.replay,
             blind: case.config.policy.is_blind_bound(),
             outcome,
             not_applicable: case.not_applicable.clone(),

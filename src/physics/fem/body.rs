@@ -184,8 +184,8 @@ impl FemModel {
     ///
     /// It stands for the compliance to pressure that changes within a voxel, which the voxels lack: that of a half
     /// space to a wave of length λ is `λ (1 − ν²) / (π E)`. The factor is measured: presses by gel pads, and by flat
-    /// ones in the independent reference, with 6 to 12 voxels have the force of 24. With a stiff surface, 30, force and
-    /// deformation at a width are up to 28 and 42 % too large with six voxels.
+    /// ones in the independent reference, with 6 to 12 voxels have the force of 24 within 6 %. With a stiff surface,
+    /// 30, force and deformation at a width are up to 28 and 42 % too large with six voxels.
     pub fn contact_modulus(&self) -> f64 {
         (7.0 * self.material.youngs_pa() / self.mesh.edge).min(1e9)
     }

@@ -43,6 +43,8 @@ const BYTES_PER_SOLID: usize = 4 << 10;
 const BYTES_PER_NODE: usize = 64;
 
 const POSITION: Type = Type::vector(3, "m");
+/// Largest length over which strains are averaged, voxels.
+const LARGEST_LENGTH: f64 = 8.0;
 const AVERAGED: Type = Type::Number("m", Range::closed(1e-4, 0.1));
 const PERCENT: Type = Type::Number("%", Range::closed(0.0, 100.0));
 const AXIS_ANGLE: Type = Type::vector(3, "rad");
@@ -517,18 +519,20 @@ class! {
             fn stable_strain(_, this) -> ["number?"] { lock(&this.world).bodies[this.id.index()].stable_strain }
             /// Returns the compressive strain that `percent` of the volume stays below: 1 − σ_min(F) at the Gauss
             /// points, weighted by volume. 95 is usual; a number between 0 and 1 is most likely a share, and an error.
-            /// With a `length`, of a voxel or more, the strain of a point is its average within that distance.
+            /// With a `length`, of 1 to 8 voxels, the strain of a point is its average within that distance.
             fn strain_percentile(lua, this, percent: f64 = PERCENT, length: Option<f64> = AVERAGED) -> ["number"] {
                 if percent > 0.0 && percent < 1.0 {
                     let (given, meant) = (format_number(percent), significant(100.0 * percent, 6));
                     bail!(lua, "body:strain_percentile: expected percent, got {given}; did you mean {meant}?");
                 }
                 let edge = this.read(|body| body.state.model.mesh.edge);
-                if let Some(length) = length.filter(|length| *length < edge) {
+                // The slack is for a length of whole voxels.
+                let is_averaged = |length: &f64| (1.0 - 1e-9..=LARGEST_LENGTH).contains(&(length / edge));
+                if let Some(length) = length.filter(|length| !is_averaged(length)) {
                     let (length, edge) = (significant(1e3 * length, 3), significant(1e3 * edge, 3));
                     bail!(
                         lua,
-                        "body:strain_percentile: length: {length} mm is below a voxel, {edge} mm; raise the resolution of the body"
+                        "body:strain_percentile: length: expected 1 to {LARGEST_LENGTH} voxels of {edge} mm, got {length} mm; change the resolution of the body"
                     );
                 }
                 let (tail, length) = (1.0 - percent / 100.0, length.unwrap_or(0.0));

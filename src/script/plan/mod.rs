@@ -503,6 +503,15 @@ fn condition(lua: &Lua, list: &Table, spec: &ConditionSpec) -> mlua::Result<Cond
     Settings::default().check_fields(&set).map_err(|error| {
         fail_at_key(lua, list, "conditions", format_args!("condition {:?}: set: {error}", spec.name))
     })?;
+    if spec.replay && (spec.policy.is_some() || spec.rigid_twin) {
+        let problem = "replay repeats the actions of the reference; leave out policy and rigid_twin";
+        return Err(fail_at_key(
+            lua,
+            list,
+            "conditions",
+            format_args!("condition {:?}: {problem}", spec.name),
+        ));
+    }
     Ok(Condition {
         name: spec.name.clone(),
         shift,
