@@ -120,6 +120,7 @@ fn assets_without_a_window_are_told_with_the_files_of_all_assets() {
 }
 
 #[test]
+#[ignore = "slow: two calibrations, with presses on a fine mesh"]
 fn the_place_of_the_shape_and_the_step_of_the_physics_do_not_change_the_limit() {
     let nominal = limit(calibrated(), "run");
     let moved = brick(STRAINS);
@@ -145,6 +146,7 @@ fn any_step_and_accuracy_end_a_calibration() {
 }
 
 #[test]
+#[ignore = "slow: a calibration and eight presses on fine meshes"]
 fn a_calibration_is_checked_for_the_object_that_was_calibrated() {
     let project = brick("collapse_strain = 0.12");
     // 5 % of the window are 0.1 mm.
