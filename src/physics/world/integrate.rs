@@ -147,7 +147,10 @@ mod tests {
 
     #[test]
     fn mass_proportional_damping_slows_every_motion_of_a_body_in_flight_alike() {
-        let (mut world, id) = thrown(0.2, PhysicsParams { rayleigh_mass: 2.5, ..PhysicsParams::default() });
+        let (mut world, id) = thrown(
+            0.2,
+            PhysicsParams { rayleigh_mass: 2.5, average_acceleration: false, ..PhysicsParams::default() },
+        );
         let start = angular_momentum(&world.soft(id).state);
         (0..15).for_each(|_| world.step().expect("a step without contact"));
         let kept = (1.0 + 2.5 / 60.0f64).powi(-15);
