@@ -1026,7 +1026,7 @@ function Body:deformation() end
 ---@return number?
 function Body:stable_strain() end
 
----Returns the compressive strain that `percent` of the volume stays below: 1 − σ_min(F) at the Gauss points, weighted by volume. 95 is usual; a number between 0 and 1 is most likely a share, and an error. With a `length`, of a voxel or more, the strain of a point is its average within that distance.
+---Returns the compressive strain that `percent` of the volume stays below: 1 − σ_min(F) at the Gauss points, weighted by volume. 95 is usual; a number between 0 and 1 is most likely a share, and an error. With a `length`, of 1 to 8 voxels, the strain of a point is its average within that distance.
 ---@param percent number
 ---@param length? number
 ---@return number
