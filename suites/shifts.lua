@@ -5,6 +5,7 @@
 --   softvt suites/shifts.lua --suite object_soft,spatial_rigid --episodes 1
 --   softvt suites/shifts.lua --conditions standard,perturbations --policy ws://host:8000
 local shifts = require "shifts"
+local suites_of = require "suites_of"
 
 local LISTS = { standard = shifts.conditions, all_objects = shifts.all_objects, perturbations = shifts.perturbations }
 
@@ -17,18 +18,11 @@ local opt = softvt.options {
   },
 }
 
-local suites, conditions = {}, {}
-for _, name in ipairs(opt.suite) do
-  local found = require("suites." .. name)
-  -- A file may return several, as suites/all.lua does.
-  for _, suite in ipairs(#found > 0 and found or { found }) do
-    table.insert(suites, suite)
-  end
-end
+local conditions = {}
 for _, name in ipairs(opt.conditions) do
   for _, condition in ipairs(LISTS[name]) do
     table.insert(conditions, condition)
   end
 end
 
-return softvt.conditions { name = "shifts", suites = suites, conditions = conditions }
+return softvt.conditions { name = "shifts", suites = suites_of(opt.suite), conditions = conditions }

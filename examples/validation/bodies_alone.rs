@@ -65,7 +65,7 @@ pub fn extremes(report: &mut Report) {
         let free::Throw { spin, stretch, beta, .. } = throw;
         row!("{body} | {spin} | {stretch} | {beta} | {} | {:.6} | {change}", short(gain), flight.kept);
         let what = format!("free flight at {spin} rad/s, stretch {stretch}: gain");
-        report.claim(&what, [gain.max(0.0)], 0.03);
+        report.claim(&what, [gain.max(0.0)], 1e-3);
         report.claim("free flight: change of momentum", [flight.momentum_change], 1e-9);
         report.claim("free flight: change of angular momentum", [flight.spin_change], 1e-6);
     }

@@ -73,6 +73,9 @@ const MISSES: &str = "
   60 Hz for the same reason, as far as known; at 120 Hz it is within 2 %.
 - A body with ν = 0.499 and without any damping becomes invalid in an impact at 1.4 m/s at 60 Hz; a loss factor
   of 6 % at 10 Hz (β = 1 ms) suffices. Restitution differs by up to a quarter between rates: a bounce is a few parts of a step long.
+- Energies that seem to grow: velocities are those of the middle of the steps, and the kinetic energy at the end of one is taken as the mean of
+  two. In an impact, and of modes that the step does not resolve, that is not the energy.
+- In light grasps, D swings when the lift loads the object: nothing damps it but the material.
 - In a hand that shuts fully, single outer nodes of an object ring with up to 0.1 m/s: average acceleration does not damp what the step does
   not resolve. D changes by less than 0.1 % (`standard_objects_rest_and_do_not_turn_inside_out_in_a_shut_hand`).
 - A thin wall that fills less than half of a voxel is too stiff in bending, by the 5 % that keeps almost empty voxels regular: a ring of

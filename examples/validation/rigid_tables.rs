@@ -39,7 +39,7 @@ pub fn rigid(report: &mut Report) {
     header("largest gain of energy in a step | of the initial energy");
     for (name, gain) in rigid::largest_gains() {
         row!("{name} | {gain:.1e}");
-        report.claim(&format!("energy gained in a step: {name}"), [gain.max(0.0)], 2e-3);
+        report.claim(&format!("energy gained in a step: {name}"), [gain.max(0.0)], 1e-3);
     }
 }
 

@@ -77,7 +77,7 @@ pub fn mean_gradients(h: f64, fill: &OccupancyMask) -> [Vec3; 8] {
 const MODES: usize = 8 + 3;
 /// Degrees of freedom: `3 m + i` is axis `i` of mode `m`.
 const FREEDOMS: usize = 3 * MODES;
-/// Those of the corners.
+/// Degrees of freedom of the corners.
 const CORNERS: usize = 3 * 8;
 
 /// Stiffness of a voxel of edge `h` of which `fill` is material.
