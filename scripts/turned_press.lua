@@ -83,6 +83,7 @@ local function build(point)
     body = softvt.soft {
       youngs_pa = from.youngs_pa,
       poisson = from.poisson,
+      loss_factor = from.loss_factor,
       density = from.density,
       resolution = point.resolution,
       grasp_spacing = 1e-3 * opt.spacing_mm,

@@ -16,7 +16,8 @@ local REST_TIMEOUT_S = 3 -- longest wait for rest, s
 local SETTLE_SPEED, SETTLE_S = 1e-3, 0.5 -- the same for the object alone on the table
 local PERCENTILE = 95 -- share of the volume that stays below the reported strain, %
 local STRAIN_LENGTH = 4e-3 -- length over which a strain is averaged, several cells of a crumb, m
-local FINE, FINE_STEP = 18, 1e-3 -- least resolution of the mesh on which strains are found, and step of the width, m
+local FINE = 18 -- least resolution of the mesh on which strains are found
+local FINE_STEP, FINE_CONTACT_STEP = 1e-3, 2.5e-4 -- steps of the width there, m
 local UNSTABLE = 20 -- rows before the first stable one that end a sweep
 local HOLD_S = 1 -- hold after the lift, s
 local REFINEMENTS = 2 -- hold trials near τ, for the tight end
@@ -49,6 +50,7 @@ local function instance(asset, change)
     body = softvt.soft {
       youngs_pa = youngs * from.youngs_pa,
       poisson = from.poisson,
+      loss_factor = from.loss_factor,
       density = density * from.density,
       grasp_spacing = scale * from.grasp_spacing,
       resolution = change.resolution or from.resolution,
@@ -204,20 +206,20 @@ local function find_contact(bench, step)
   return bench.width
 end
 
--- Presses from first contact inward in steps of `step` (m) until `is_last(row, bench)` or the press is no longer
--- stable. Returns the rows, and why the press ended if they do not tell.
-local function press_in(bench, step, is_last)
+-- Presses from first contact, sought in steps of `contact_step` (m), inward in steps of `step` (m) until `is_last(row)`
+-- or the press is no longer stable. Returns the rows, and why the press ended if they do not tell.
+local function press_in(bench, contact_step, step, is_last)
   local rows, index = {}, nil
-  local width, ended = find_contact(bench, CONTACT_STEP)
+  local width, ended = find_contact(bench, contact_step)
   while width and width > 0 do
     local row = squeeze(bench, width)
     if not row then return rows, bench.problem end
     rows[#rows + 1] = row
     if not row.stable and (index or #rows >= UNSTABLE) then return rows end
-    if is_last(row, bench) then return rows end
+    if is_last(row) then return rows end
     -- Once both pads touch at rest, widths are multiples of the step.
     if index or row.stable then index = (index or math.ceil(width / step - 1e-6)) - 1 end
-    width = rounded(index and index * step or width - CONTACT_STEP)
+    width = rounded(index and index * step or width - contact_step)
   end
   return rows, ended or "the pads have met"
 end
@@ -253,7 +255,7 @@ function press.strains(asset, change)
   -- The weight alone strains the body.
   local found = { { d_pct = 0, strain = strain() } }
   if found[1].strain >= stable_strain then return { found[1], { d_pct = 1, strain = found[1].strain } } end
-  local _, ended = press_in(bench, FINE_STEP, function(row)
+  local _, ended = press_in(bench, FINE_CONTACT_STEP, FINE_STEP, function(row)
     local last = found[#found]
     if row.stable and row.d_pct > last.d_pct then
       last = { d_pct = row.d_pct, strain = strain() }
@@ -287,7 +289,7 @@ function press.sweep(asset, step, change, strains)
   if not bench then return sweep end
   sweep.tilt_deg = bench.tilt and math.deg(bench.tilt)
   if not stable_strain then
-    sweep.rows, sweep.ended = press_in(bench, step, function(row)
+    sweep.rows, sweep.ended = press_in(bench, CONTACT_STEP, step, function(row)
       row.strain_p95 = bench.body:strain_percentile(PERCENTILE)
       return false
     end)
@@ -298,7 +300,7 @@ function press.sweep(asset, step, change, strains)
     sweep.ended = known.ended
     return sweep
   end
-  sweep.rows, sweep.ended = press_in(bench, step, function(row)
+  sweep.rows, sweep.ended = press_in(bench, CONTACT_STEP, step, function(row)
     row.strain_p95 = strain_at(known, row.d_pct)
     if known.ended and row.d_pct >= known[#known].d_pct then return true end
     return row.strain_p95 >= stable_strain

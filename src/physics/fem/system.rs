@@ -101,6 +101,7 @@ pub(crate) struct VelocitySystem {
     stale_rotation: f64,
     /// Velocities in the frame, and their products with `A`.
     turned: Vec<Vec3>,
+    solved: Vec<Vec3>,
     product: Vec<Vec3>,
     /// Number of factorizations so far.
     pub factorizations: u64,
@@ -246,6 +247,7 @@ impl VelocitySystem {
             work: vec![0.0; 3 * nodes],
             stale_rotation: stale_rotation(&rest.material),
             turned: Vec::new(),
+            solved: vec![Vec3::zeros(); nodes],
             product: Vec::new(),
             factorizations: 0,
         }
@@ -401,7 +403,7 @@ impl VelocitySystem {
     }
 
     /// Computes the velocities of all nodes from those of the retained ones (m/s, world, 3 per node).
-    pub(crate) fn complete(&mut self, retained: &[f64], v: &mut [Vec3]) {
+    pub(crate) fn complete(&mut self, retained: &[f64]) {
         let Some(plan) = &self.plan else { return };
         let inner = 3 * (plan.order.len() - plan.retained);
         for (chunk, v) in self.work[inner..].chunks_exact_mut(3).zip(retained.chunks_exact(3)) {
@@ -409,8 +411,13 @@ impl VelocitySystem {
         }
         self.factor.backward(plan, &mut self.work);
         for (chunk, &node) in self.work.chunks_exact(3).zip(&plan.order) {
-            v[node as usize] = self.frame * Vec3::from_column_slice(chunk);
+            self.solved[node as usize] = self.frame * Vec3::from_column_slice(chunk);
         }
+    }
+
+    /// The velocities of all nodes that [`VelocitySystem::complete`] has found, m/s, world.
+    pub(crate) fn solved(&self) -> &[Vec3] {
+        &self.solved
     }
 }
 

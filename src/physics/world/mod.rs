@@ -224,10 +224,8 @@ impl World {
     /// [`StepFailure`]: the state must not be used afterwards.
     pub fn step(&mut self) -> Result<(), StepFailure> {
         self.begin_step();
-        match self.step_parts() {
-            1 => self.finish_step(),
-            parts => self.step_in_parts(parts),
-        }
+        let parts = self.step_parts();
+        if parts == 1 && self.solve()? { self.finish_step() } else { self.step_in_parts(parts.max(2)) }
     }
 
     /// Wakes what is disturbed, and finds what may touch in the whole step.
@@ -247,12 +245,22 @@ impl World {
         self.mark_attached();
     }
 
-    /// Solves and integrates a step whose candidates are known.
-    fn finish_step(&mut self) -> Result<(), StepFailure> {
+    /// Solves a step whose candidates are known; false if it must be divided.
+    fn solve(&mut self) -> Result<bool, StepFailure> {
         self.assemble()?;
         let solved = self.solver.solve(&mut self.problem);
         self.stats = solved
             .map_err(|f| StepFailure::Diverged { step: self.step, residual_ratio: f.residual_ratio })?;
+        self.complete();
+        let is_short = !self.moves_too_far();
+        if !is_short {
+            self.part_dt = 0.5 * self.params.dt;
+        }
+        Ok(is_short)
+    }
+
+    /// Integrates a step that is solved.
+    fn finish_step(&mut self) -> Result<(), StepFailure> {
         self.integrate();
         self.last_dt = self.params.dt;
         self.record_contacts();

@@ -1,18 +1,20 @@
-//! Division of a step in which something moves far: an impact, a body that rolls or whips.
+//! Division of a step in which something moves far: an impact, a body that rolls, whips or springs back.
 //!
 //! A step linearises the elastic force and the place of each contact at its start, and an impact loses the energy of
-//! what moves along within it. So no node of a body that touches may move far against the size of its voxels: the step
-//! is divided until each part is short enough. Average acceleration needs that; implicit Euler damps such motion.
+//! what moves along within it. So no node may move far against the size of its voxels: the step is divided until each
+//! part is short enough. Motion into a contact counts as it is at the start of a part, motion relative to the centre of
+//! a body at the start and as it is solved: a part whose solved motion is too long is solved again, half as long.
+//! Average acceleration needs that; implicit Euler damps such motion.
 
-use super::{StepFailure, World};
+use super::{JointDrive, StepFailure, World};
 use crate::{
-    fem::{FemModel, system::StepCoefficients},
+    fem::{FemModel, FemState, system::StepCoefficients},
     params::PhysicsParams,
 };
-use softvt_geometry::Pose;
+use softvt_geometry::{Pose, Vec3};
 
 /// Largest way of a node in a part of a step, over the voxel edge: of its approach to what it will reach, and of its
-/// motion relative to the centre of its body.
+/// motion relative to the centre of its body, but for the rotation of a body in flight.
 const LARGEST_WAY: f64 = 0.1;
 /// Largest number of parts.
 const MAX_PARTS: u32 = 32;
@@ -30,10 +32,8 @@ impl World {
         }
         let dt = self.params.dt;
         let parts = self.soft_ids().filter(|&id| self.candidates.involves(id)).map(|id| {
-            let body = &self.soft(id).state;
-            let centre = body.velocity();
-            let whirl = body.v.iter().map(|v| (v - centre).norm_squared()).fold(0.0, f64::max).sqrt();
-            dt * whirl.max(self.approach(id)) / (LARGEST_WAY * body.model.mesh.edge)
+            let FemState { model, v, .. } = &self.soft(id).state;
+            dt * largest_deviation(model, v).max(self.approach(id)) / (LARGEST_WAY * model.mesh.edge)
         });
         let needed = dt / parts.fold(1.0, f64::max);
         let allowed = if self.part_dt > 0.0 { self.part_dt * libm::exp2(dt / DOUBLING_TIME) } else { dt };
@@ -42,36 +42,68 @@ impl World {
         ((dt / self.part_dt - 1e-9).ceil() as u32).next_power_of_two().min(MAX_PARTS)
     }
 
-    /// Takes the step in equal parts. Prescribed frames and the targets of drives move along lines.
+    /// Takes the step in parts that are equal, or become shorter where the solved motion is long. Prescribed frames and
+    /// the targets of drives move along lines.
     pub(super) fn step_in_parts(&mut self, parts: u32) -> Result<(), StepFailure> {
         let dt = self.params.dt;
         let ends: Vec<Pose> = self.kinematic.iter().map(|frame| frame.next).collect();
         let drives: Vec<_> = self.articulations.iter().map(|moved| moved.drives.clone()).collect();
-        self.params.dt = dt / f64::from(parts);
-        let taken = (0..parts).try_for_each(|part| {
-            for (frame, end) in self.kinematic.iter_mut().zip(&ends) {
-                frame.next = frame.pose.lerp_slerp(end, 1.0 / f64::from(parts - part));
-            }
-            for (moved, ends) in self.articulations.iter_mut().zip(&drives) {
-                moved.move_targets(ends, 1.0 / f64::from(parts - part));
-            }
-            if part == 0 {
-                self.shorten_candidates();
-            } else {
-                self.count_steps_awake();
-                self.update_collider_motions();
-                self.find_candidates();
-            }
-            self.finish_step()?;
-            self.add_part(1.0 / f64::from(parts));
-            Ok(())
-        });
+        let taken = self.take_parts(MAX_PARTS / parts, &ends, &drives);
         self.kinematic.iter_mut().zip(ends).for_each(|(frame, end)| (frame.pose, frame.next) = (end, end));
         self.articulations.iter_mut().zip(drives).for_each(|(moved, drives)| moved.drives = drives);
         self.params.dt = dt;
         taken?;
         self.report_means();
         Ok(())
+    }
+
+    /// Takes the step in parts of `length`, in units of the shortest part.
+    fn take_parts(
+        &mut self,
+        mut length: u32,
+        ends: &[Pose],
+        drives: &[Vec<Option<JointDrive>>],
+    ) -> Result<(), StepFailure> {
+        let (whole, mut left, mut is_searched) = (self.params.dt, MAX_PARTS, true);
+        while left > 0 {
+            self.params.dt = whole * f64::from(length) / f64::from(MAX_PARTS);
+            let share = f64::from(length) / f64::from(left);
+            for (frame, end) in self.kinematic.iter_mut().zip(ends) {
+                frame.next = frame.pose.lerp_slerp(end, share);
+            }
+            for (moved, ends) in self.articulations.iter_mut().zip(drives) {
+                moved.move_targets(ends, share);
+            }
+            if is_searched {
+                self.shorten_candidates();
+            } else {
+                self.count_steps_awake();
+                self.update_collider_motions();
+                self.find_candidates();
+            }
+            is_searched = !self.solve()?;
+            if is_searched {
+                length /= 2;
+                continue;
+            }
+            self.finish_step()?;
+            self.add_part(f64::from(length) / f64::from(MAX_PARTS));
+            left -= length;
+        }
+        Ok(())
+    }
+
+    /// True if the solved motion of a soft body is too long for the present part of the step, which is not the
+    /// shortest.
+    pub(super) fn moves_too_far(&self) -> bool {
+        let is_divisible = self.part_share() > 1.5 / f64::from(MAX_PARTS);
+        self.params.average_acceleration
+            && is_divisible
+            && self.soft.iter().zip(&self.blocks.soft).any(|(soft, block)| {
+                let model = &soft.state.model;
+                let longest = largest_way(model) / self.params.dt;
+                block.is_some() && largest_deviation(model, soft.system.solved()) > longest
+            })
     }
 
     /// Share of the whole step for which the present part of it lasts.
@@ -83,6 +115,20 @@ impl World {
     pub(super) fn growth(&self) -> f64 {
         if self.last_dt > 0.0 { self.params.dt / self.last_dt } else { 1.0 }
     }
+}
+
+/// Largest difference between the velocity of a node and that of the centre, m/s.
+fn largest_deviation(model: &FemModel, v: &[Vec3]) -> f64 {
+    let momentum: Vec3 = v.iter().zip(&model.mass).map(|(v, m)| v * *m).sum();
+    let centre = momentum / model.total_mass();
+    v.iter().map(|v| (v - centre).norm_squared()).fold(0.0, f64::max).sqrt()
+}
+
+/// Largest way of a node relative to the centre in a part of a step, m. Linearised, a turn by an angle θ changes the
+/// volume by θ², which a nearly incompressible body resists with the larger Lamé parameter.
+fn largest_way(model: &FemModel) -> f64 {
+    let ratio = model.material.shear_modulus() / model.material.lame_lambda();
+    LARGEST_WAY * (1.5 * ratio).sqrt().min(1.0) * model.mesh.edge
 }
 
 /// Factor of all masses in a step that is not as long as the last one.

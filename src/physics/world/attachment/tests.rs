@@ -23,9 +23,8 @@ fn end(side: f64, depth: f64) -> Shape {
     Shape::cuboid(size).translated(Vec3::new(0.5 * side * LENGTH, 0.0, 0.0))
 }
 
-/// The bounds of these tests are those of implicit Euler.
 fn world(gravity: Vec3) -> World {
-    let params = PhysicsParams { sleeping: false, average_acceleration: false, ..PhysicsParams::default() };
+    let params = PhysicsParams { sleeping: false, ..PhysicsParams::default() };
     World::new(params, gravity)
 }
 
@@ -64,11 +63,7 @@ fn thrown(params: PhysicsParams, spin: f64, stretch: f64) -> World {
 #[test]
 fn a_body_and_the_load_on_it_keep_their_momenta_and_gain_no_energy_in_flight() {
     for (spin, stretch, beta) in [(0.0, 0.1, 0.0), (2.0, 0.0, 5e-3), (10.0, 0.05, 5e-3), (20.0, 0.1, 0.0)] {
-        let params = PhysicsParams {
-            rayleigh_stiffness: beta,
-            average_acceleration: false,
-            ..PhysicsParams::default()
-        };
+        let params = PhysicsParams { rayleigh_stiffness: beta, ..PhysicsParams::default() };
         let mut world = thrown(params, spin, stretch);
         let (start, first) = (momenta(&world), world.energy().total());
         let (mut last, mut gain) = (first, 0.0f64);
@@ -79,7 +74,8 @@ fn a_body_and_the_load_on_it_keep_their_momenta_and_gain_no_energy_in_flight() {
             last = now;
         }
         let end = momenta(&world);
-        assert!(gain < 1e-6, "{spin}: {gain} of the energy");
+        // Velocities are those of the middle of the steps, positions those at their ends.
+        assert!(gain < 1e-5, "{spin}: {gain} of the energy");
         assert!((end.0 - start.0).norm() < 1e-10 * start.0.norm(), "{spin}: {start:?} {end:?}");
         assert!((end.1 - start.1).norm() < 1e-10 * start.1.norm(), "{spin}: {start:?} {end:?}");
     }
@@ -138,7 +134,7 @@ fn a_clamp_that_moves_and_turns_carries_the_body_along() {
             Pose::from_parts(Vec3::new(-0.2, 0.3 + 0.2 * t.min(1.0), 0.0).into(), turn)
         };
         let mut worst = 0.0f64;
-        for step in 1..=(2.5 * rate) as u32 {
+        for step in 1..=(5.0 * rate) as u32 {
             world.move_kinematic(frame, goal(f64::from(step) / rate));
             world.step().expect("a step");
             worst = worst.max(stretch(&world, clamp));
@@ -209,7 +205,7 @@ fn a_hanging_load_pulls_with_its_weight_and_nothing_creeps_or_touches() {
     let rigid = world.insert(brick.at(0.5 * LENGTH + 0.005, 0.0, 0.0)).expect("a brick");
     let clamp = world.attach(soft, &end(-1.0, 0.01), BodyId::World).expect("an end");
     let load = world.attach(soft, &end(1.0, 1e-4), rigid).expect("an end face");
-    world.run(3.0).expect("steps");
+    world.run(10.0).expect("steps");
     let weight = |body: BodyId| Vec3::z() * (9.81 * world.mass(body).expect("a mass"));
     let (hung, all) = (weight(rigid.into()), weight(rigid.into()) + weight(soft.into()));
     assert!((world.attachment(load).force_w + hung).norm() < 1e-6 * all.z);

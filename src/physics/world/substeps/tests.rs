@@ -78,7 +78,11 @@ impl Press {
         drives.iter_mut().flatten().for_each(|drive| drive.target += share * (target - drive.target));
         self.world.params.dt = dt;
         self.world.begin_step();
-        let taken = if parts == 1 { self.world.finish_step() } else { self.world.step_in_parts(parts) };
+        let taken = if parts == 1 {
+            self.world.solve().and_then(|_| self.world.finish_step())
+        } else {
+            self.world.step_in_parts(parts)
+        };
         taken.expect("a step that converges");
     }
 
