@@ -212,7 +212,7 @@ fn a_soft_cube_dropped_at_two_metres_a_second_crosses_no_wall() {
             let (deepest, last, centre) = drop_into(shape, pose);
             // The cube's corners reach half a sample's spacing, 0.75 mm, beyond its last samples, and its surface
             // yields by less than its layer, a seventh of a voxel, 1.2 mm.
-            assert!(deepest < 1.9e-3, "{name}, {place}: {deepest} m deep, {last} in the end, at {centre}");
+            assert!(deepest < 1.3e-3, "{name}, {place}: {deepest} m deep, {last} in the end, at {centre}");
             assert!(centre.z > 0.02 && centre.xy().norm() < 0.06, "{name}, {place}: ends at {centre}");
         }
     }

@@ -20,7 +20,7 @@ pub fn advance(body: &mut FemState, dt: f64) {
     let (centre, drift) = (body.centre(), body.velocity());
     let Spin { momentum, inertia } = Spin::new(body, &centre, &drift);
     let w = inertia.try_inverse().map_or(Vec3::zeros(), |inverse| inverse * momentum);
-    if w.norm() * dt < MIN_ROTATION {
+    if w.norm() * dt.abs() < MIN_ROTATION {
         body.x.iter_mut().zip(&body.v).for_each(|(x, v)| *x += v * dt);
         return;
     }

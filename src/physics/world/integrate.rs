@@ -181,7 +181,7 @@ mod tests {
                 world.step().expect("a step without contact");
                 let now = world.energy().total() / start;
                 assert!(
-                    now < 1.05,
+                    now < 1.001,
                     "ν {poisson}, {spin} rad/s, strain {stretch}, β {beta}: {now} at step {step}"
                 );
             }

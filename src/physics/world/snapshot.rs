@@ -4,6 +4,7 @@ use super::{
     BodyContact, World, contact_points::SpringUpdate, rigid_contacts::PointKey, state::ContactSummary,
 };
 use crate::{
+    fem::rigid_motion,
     ids::{BodyId, ColliderId, ContactPartner, LinkId, RigidId, SoftId},
     joints::{kinetic_energy, potential_energy},
     solver::ContactPoint,
@@ -103,7 +104,8 @@ pub(super) struct ColliderPoint {
 pub struct Energy {
     /// Kinetic energy of all bodies, J.
     pub kinetic: f64,
-    /// Elastic, of soft bodies.
+    /// Elastic, of soft bodies, at the time of their velocities: with average acceleration, the middle of the last step
+    /// or part of one.
     pub elastic: f64,
     /// Gravitational, zero at the world's origin.
     pub potential: f64,
@@ -287,10 +289,14 @@ impl World {
 
     /// Energies of soft bodies, rigid bodies, and the articulations on which gravity acts.
     pub fn energy(&self) -> Energy {
+        let since = if self.params.average_acceleration { 0.5 * self.last_dt } else { 0.0 };
         let mut energy = Energy { kinetic: 0.0, elastic: 0.0, potential: 0.0 };
         for soft in &self.soft {
+            let mut then = soft.state.clone();
+            rigid_motion::advance(&mut then, -since);
+            then.update_elastic(0.0);
             energy.kinetic += soft.state.kinetic_energy();
-            energy.elastic += soft.state.elastic_energy;
+            energy.elastic += then.elastic_energy;
             energy.potential -= soft.state.model.total_mass() * self.gravity.dot(&soft.state.centre());
         }
         for rigid in &self.rigid {

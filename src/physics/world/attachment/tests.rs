@@ -74,7 +74,7 @@ fn a_body_and_the_load_on_it_keep_their_momenta_and_gain_no_energy_in_flight() {
             last = now;
         }
         let end = momenta(&world);
-        // Velocities are those of the middle of the steps, positions those at their ends.
+        // Without that of the bonds.
         assert!(gain < 1e-5, "{spin}: {gain} of the energy");
         assert!((end.0 - start.0).norm() < 1e-10 * start.0.norm(), "{spin}: {start:?} {end:?}");
         assert!((end.1 - start.1).norm() < 1e-10 * start.1.norm(), "{spin}: {start:?} {end:?}");
