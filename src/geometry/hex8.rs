@@ -35,6 +35,20 @@ pub fn gauss_points() -> [Vec3; 8] {
     std::array::from_fn(|g| Vec3::new(at(g & 1), at(g >> 1 & 1), at(g >> 2 & 1)))
 }
 
+/// A point of a quadrature rule in an element.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct QuadraturePoint {
+    /// Local coordinates, in `[0, 1]³`.
+    pub xi: Vec3,
+    /// Volume that it stands for, m³.
+    pub weight: f64,
+}
+
+/// The rule of the 2×2×2 Gauss points of a cube with this volume, m³.
+pub fn gauss_rule(volume: f64) -> impl Iterator<Item = QuadraturePoint> {
+    gauss_points().into_iter().map(move |xi| QuadraturePoint { xi, weight: volume / 8.0 })
+}
+
 /// Gradients of the eight shape functions at local coordinates `xi` of a cube with edge `h` (m), 1/m.
 pub fn gradients(xi: &Vec3, h: f64) -> [Vec3; 8] {
     std::array::from_fn(|corner| {

@@ -5,13 +5,15 @@
 use serde::{Deserialize, Serialize};
 
 use super::{
-    Aabb, Vec3, hex8,
+    Aabb, Vec3,
+    hex8::{self, QuadraturePoint},
     shape::{Shape, ShapeError},
 };
 
 /// Sub-cells of a voxel along each axis, on which its filled part is known.
 pub const SUBCELLS: usize = 6;
-const CELLS_PER_VOXEL: usize = SUBCELLS * SUBCELLS * SUBCELLS;
+/// Sub-cells of a voxel.
+pub const CELLS_PER_VOXEL: usize = SUBCELLS * SUBCELLS * SUBCELLS;
 
 /// Filled sub-cells of a voxel: bit `i + SUBCELLS (j + SUBCELLS k)` is set if the centre of the sub-cell
 /// is inside the body.
@@ -19,20 +21,22 @@ const CELLS_PER_VOXEL: usize = SUBCELLS * SUBCELLS * SUBCELLS;
 pub struct OccupancyMask(pub [u64; 4]);
 
 impl OccupancyMask {
-    /// The mask of a voxel that is entirely inside.
-    pub fn full() -> Self {
+    /// The mask of the sub-cells for which `is_inside` is true.
+    pub fn from_fn(is_inside: impl Fn(usize) -> bool) -> Self {
         let mut fill = Self::default();
-        (0..CELLS_PER_VOXEL).for_each(|cell| fill.insert(cell));
+        (0..CELLS_PER_VOXEL)
+            .filter(|&cell| is_inside(cell))
+            .for_each(|cell| fill.0[cell / 64] |= 1 << (cell % 64));
         fill
     }
 
-    /// Sets the bit of sub-cell `cell`.
-    pub fn insert(&mut self, cell: usize) {
-        self.0[cell / 64] |= 1 << (cell % 64);
+    /// The mask of a voxel that is entirely inside.
+    pub fn full() -> Self {
+        Self::from_fn(|_| true)
     }
 
     /// True if sub-cell `cell` is inside.
-    pub fn contains(&self, cell: usize) -> bool {
+    fn contains(&self, cell: usize) -> bool {
         self.0[cell / 64] >> (cell % 64) & 1 == 1
     }
 
@@ -48,15 +52,30 @@ impl OccupancyMask {
 
     /// Box around the filled sub-cells, local coordinates; `None` without any.
     pub(super) fn bounds(&self) -> Option<Aabb> {
-        let centres: Vec<Vec3> =
-            (0..CELLS_PER_VOXEL).filter(|&cell| self.contains(cell)).map(Self::centre).collect();
+        let centres: Vec<Vec3> = self.centres().collect();
         Aabb::from_points(&centres).map(|around| around.loosened(0.5 / SUBCELLS as f64))
     }
 
     /// Local coordinates `ξ ∈ [0, 1]³` of the centre of sub-cell `cell`.
-    pub fn centre(cell: usize) -> Vec3 {
+    fn centre(cell: usize) -> Vec3 {
         let at = |i: usize| (i as f64 + 0.5) / SUBCELLS as f64;
         Vec3::new(at(cell % SUBCELLS), at(cell / SUBCELLS % SUBCELLS), at(cell / SUBCELLS / SUBCELLS))
+    }
+
+    /// Local coordinates of the centres of the filled sub-cells.
+    pub fn centres(&self) -> impl Iterator<Item = Vec3> {
+        (0..CELLS_PER_VOXEL).filter(|&cell| self.contains(cell)).map(Self::centre)
+    }
+
+    /// Quadrature over the filled part of a voxel of edge `h`: by 2×2×2 Gauss points in a full one, else by the
+    /// centres of its filled sub-cells.
+    pub fn quadrature(&self, h: f64) -> Vec<QuadraturePoint> {
+        let volume = h.powi(3);
+        if *self == Self::full() {
+            return hex8::gauss_rule(volume).collect();
+        }
+        let weight = volume / CELLS_PER_VOXEL as f64;
+        self.centres().map(|xi| QuadraturePoint { xi, weight }).collect()
     }
 }
 
@@ -79,6 +98,15 @@ pub struct VoxelMesh {
     pub cell_element: Vec<u32>,
 }
 
+/// The fills of a mesh without repetitions.
+#[derive(Clone, Debug)]
+pub struct DistinctFills {
+    /// Fills in the order of the elements that have them first.
+    pub fills: Vec<OccupancyMask>,
+    /// Index of the fill of each element.
+    pub of_element: Vec<u32>,
+}
+
 /// Integral of the product of two fields over the filled part of a mesh, `∫ u v dV = Σ uᵀ M v` over its elements: what
 /// finite elements call a consistent mass matrix, at unit density.
 #[derive(Clone, Debug)]
@@ -92,17 +120,9 @@ pub struct VolumeProduct {
 impl VolumeProduct {
     /// The product over the filled part of `mesh`.
     pub fn new(mesh: &VoxelMesh) -> Self {
-        let mut fills: Vec<OccupancyMask> = Vec::new();
-        let kind = |fill: &OccupancyMask| {
-            let found = fills.iter().position(|known| known == fill);
-            found.unwrap_or_else(|| {
-                fills.push(*fill);
-                fills.len() - 1
-            }) as u32
-        };
-        let kinds: Vec<u32> = mesh.occupancy.iter().map(kind).collect();
+        let DistinctFills { fills, of_element } = mesh.distinct_fills();
         let matrices = fills.iter().map(|fill| element_product(mesh.edge, fill)).collect();
-        Self { matrices, elements: mesh.elements.iter().copied().zip(kinds).collect() }
+        Self { matrices, elements: mesh.elements.iter().copied().zip(of_element).collect() }
     }
 
     /// Elements with their matrices, m³.
@@ -124,20 +144,13 @@ impl VolumeProduct {
     }
 }
 
-/// `∫ N_a N_b dV` over the filled part of a voxel of edge `h`: by the Gauss rule of two points per axis, which is
-/// exact, or over the sub-cells.
+/// `∫ N_a N_b dV` over the filled part of a voxel of edge `h`. The Gauss points of a full one make it exact.
 fn element_product(h: f64, fill: &OccupancyMask) -> [[f64; 8]; 8] {
-    let points: Vec<(Vec3, f64)> = if *fill == OccupancyMask::full() {
-        hex8::gauss_points().map(|xi| (xi, h.powi(3) / 8.0)).to_vec()
-    } else {
-        let cells = (0..CELLS_PER_VOXEL).filter(|&cell| fill.contains(cell));
-        cells.map(|cell| (OccupancyMask::centre(cell), h.powi(3) / CELLS_PER_VOXEL as f64)).collect()
-    };
     let mut product = [[0.0; 8]; 8];
-    for (xi, volume) in points {
-        let weights = hex8::weights(&xi);
-        for (row, a) in product.iter_mut().zip(weights) {
-            row.iter_mut().zip(weights).for_each(|(sum, b)| *sum += volume * a * b);
+    for QuadraturePoint { xi, weight } in fill.quadrature(h) {
+        let values = hex8::weights(&xi);
+        for (row, a) in product.iter_mut().zip(values) {
+            row.iter_mut().zip(values).for_each(|(sum, b)| *sum += weight * a * b);
         }
     }
     product
@@ -343,13 +356,9 @@ fn fill_of(shape: &Shape, corner: &Vec3, edge: f64) -> OccupancyMask {
     match sign_of_voxel(shape, corner, edge) {
         Some(true) => OccupancyMask::full(),
         Some(false) => OccupancyMask::default(),
-        None => {
-            let mut fill = OccupancyMask::default();
-            (0..CELLS_PER_VOXEL)
-                .filter(|&cell| shape.distance(&(corner + OccupancyMask::centre(cell) * edge)) < 0.0)
-                .for_each(|cell| fill.insert(cell));
-            fill
-        }
+        None => OccupancyMask::from_fn(|cell| {
+            shape.distance(&(corner + OccupancyMask::centre(cell) * edge)) < 0.0
+        }),
     }
 }
 
@@ -392,6 +401,20 @@ impl VoxelMesh {
             origin: self.origin * scale,
             ..self.clone()
         }
+    }
+
+    /// The fills of the elements without repetitions, so that what depends on them alone is computed once for each.
+    pub fn distinct_fills(&self) -> DistinctFills {
+        let mut fills: Vec<OccupancyMask> = Vec::new();
+        let index_of = |fill: &OccupancyMask| {
+            let known = fills.iter().position(|known| known == fill);
+            known.unwrap_or_else(|| {
+                fills.push(*fill);
+                fills.len() - 1
+            }) as u32
+        };
+        let of_element = self.occupancy.iter().map(index_of).collect();
+        DistinctFills { fills, of_element }
     }
 
     /// Embeds a rest point `p_o` (object frame, m) in the element that contains it, or in the nearest element up to two

@@ -15,7 +15,8 @@ use softvt_geometry::{
     samples::{SampleSpec, surface_samples},
     shape::Shape,
     voxel::{
-        Embedding, OccupancyMask, SUBCELLS, SurfaceSample, VoxelMesh, VoxelMeshError, VoxelSpec, voxel_mesh,
+        CELLS_PER_VOXEL, DistinctFills, OccupancyMask, SurfaceSample, VoxelMesh, VoxelMeshError, VoxelSpec,
+        voxel_mesh,
     },
 };
 
@@ -137,18 +138,7 @@ impl FemModel {
         samples: Vec<SurfaceSample>,
     ) -> Arc<Self> {
         let h = mesh.edge;
-        let mut fills: Vec<OccupancyMask> = Vec::new();
-        let stiffness_of = mesh
-            .occupancy
-            .iter()
-            .map(|fill| match fills.iter().position(|f| f == fill) {
-                Some(at) => at as u32,
-                None => {
-                    fills.push(*fill);
-                    fills.len() as u32 - 1
-                }
-            })
-            .collect();
+        let DistinctFills { fills, of_element: stiffness_of } = mesh.distinct_fills();
         let stiffness = fills.iter().map(|f| element::stiffness(h, f, &material)).collect();
         let spacing = (samples.iter().map(|s| s.area).sum::<f64>() / samples.len().max(1) as f64).sqrt();
         let (samples, groups) = group_samples(&mesh, samples);
@@ -194,12 +184,11 @@ impl FemModel {
 /// Masses lumped by the shape functions over the filled part, limited from below, and scaled to a total
 /// of `density · volume`.
 fn node_masses(mesh: &VoxelMesh, density: f64, volume: f64) -> Vec<f64> {
-    let cell = mesh.edge.powi(3) / (SUBCELLS * SUBCELLS * SUBCELLS) as f64;
+    let cell = mesh.edge.powi(3) / CELLS_PER_VOXEL as f64;
     let mut mass = vec![0.0; mesh.nodes.len()];
     for (nodes, fill) in mesh.elements.iter().zip(&mesh.occupancy) {
-        for sub in (0..SUBCELLS * SUBCELLS * SUBCELLS).filter(|&sub| fill.contains(sub)) {
-            let at = Embedding { element: 0, local: OccupancyMask::centre(sub) };
-            for (&node, w) in nodes.iter().zip(at.weights()) {
+        for centre in fill.centres() {
+            for (&node, w) in nodes.iter().zip(hex8::weights(&centre)) {
                 mass[node as usize] += density * cell * w;
             }
         }

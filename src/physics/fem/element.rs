@@ -17,8 +17,9 @@ use nalgebra::{SMatrix, Vector4};
 
 use super::material::ElasticMaterial;
 use softvt_geometry::{
-    Vec3, hex8,
-    voxel::{OccupancyMask, SUBCELLS},
+    Vec3,
+    hex8::{self, QuadraturePoint},
+    voxel::OccupancyMask,
 };
 
 /// Hourglass stiffness of a partly filled voxel besides that of its material, relative to that of a full one.
@@ -30,29 +31,6 @@ pub const GHOST: f64 = 0.05;
 /// A 24×24 matrix, column-major; degree of freedom `3 a + i` is axis `i` of corner `a`.
 pub type Stiffness = Box<[f64; 576]>;
 
-/// A quadrature point.
-struct QuadraturePoint {
-    /// Local coordinates, in `[0, 1]³`.
-    xi: Vec3,
-    /// Volume that it represents, m³.
-    weight: f64,
-}
-
-/// 2×2×2 Gauss points of a voxel with this volume, m³.
-fn whole(volume: f64) -> impl Iterator<Item = QuadraturePoint> {
-    hex8::gauss_points().into_iter().map(move |xi| QuadraturePoint { xi, weight: volume / 8.0 })
-}
-
-/// Points of the material of a voxel of edge `h` of which `fill` is filled.
-fn material_points(h: f64, fill: &OccupancyMask) -> Vec<QuadraturePoint> {
-    let cells = SUBCELLS * SUBCELLS * SUBCELLS;
-    if *fill == OccupancyMask::full() {
-        return whole(h.powi(3)).collect();
-    }
-    let sub = |cell| QuadraturePoint { xi: OccupancyMask::centre(cell), weight: h.powi(3) / cells as f64 };
-    (0..cells).filter(|&cell| fill.contains(cell)).map(sub).collect()
-}
-
 /// Averages of the shape gradients over the material of a voxel of edge `h`, 1/m.
 ///
 /// A voxel that is not full has [`GHOST`] of the whole besides. So the rotation, which follows from these gradients, is
@@ -60,9 +38,9 @@ fn material_points(h: f64, fill: &OccupancyMask) -> Vec<QuadraturePoint> {
 /// all of it, and the tangent `R K₀ Rᵀ` has no term for that: it was found 3 to 5 times too soft there. In a full voxel
 /// the averages are `±1/(4h)` on each axis.
 pub fn mean_gradients(h: f64, fill: &OccupancyMask) -> [Vec3; 8] {
-    let mut points = material_points(h, fill);
+    let mut points = fill.quadrature(h);
     if *fill != OccupancyMask::full() {
-        points.extend(whole(GHOST * h.powi(3)));
+        points.extend(hex8::gauss_rule(GHOST * h.powi(3)));
     }
     let volume: f64 = points.iter().map(|point| point.weight).sum();
     let mut mean = [Vec3::zeros(); 8];
@@ -82,10 +60,10 @@ const CORNERS: usize = 3 * 8;
 
 /// Stiffness of a voxel of edge `h` of which `fill` is material.
 pub fn stiffness(h: f64, fill: &OccupancyMask, material: &ElasticMaterial) -> Stiffness {
-    let mut points = material_points(h, fill);
+    let mut points = fill.quadrature(h);
     if *fill != OccupancyMask::full() {
         let ghost = GHOST * h.powi(3);
-        points.extend(whole(ghost));
+        points.extend(hex8::gauss_rule(ghost));
         points.push(QuadraturePoint { xi: Vec3::repeat(0.5), weight: -ghost });
     }
     let volume: f64 = points.iter().map(|point| point.weight).sum();
@@ -143,7 +121,7 @@ fn add_deviatoric(k: &mut SMatrix<f64, FREEDOMS, FREEDOMS>, g: &[Vec3; MODES], w
 #[cfg(test)]
 mod tests {
     use super::*;
-    use softvt_geometry::Mat3;
+    use softvt_geometry::{Mat3, voxel::SUBCELLS};
 
     fn apply(k: &Stiffness, u: &[f64; 24]) -> [f64; 24] {
         std::array::from_fn(|r| (0..24).map(|c| k[c * 24 + r] * u[c]).sum())
@@ -179,11 +157,7 @@ mod tests {
         for pattern in
             [|_| true, |cell| cell % 6 < 2, |cell| cell == 0, |cell| cell % 7 == 3, |cell| cell < 100]
         {
-            let mut fill = OccupancyMask::default();
-            (0..SUBCELLS * SUBCELLS * SUBCELLS)
-                .filter(|&cell| pattern(cell))
-                .for_each(|cell| fill.insert(cell));
-            let g = mean_gradients(h, &fill);
+            let g = mean_gradients(h, &OccupancyMask::from_fn(pattern));
             assert!(g.iter().sum::<Vec3>().norm() < 1e-12 / h);
             let moments: Mat3 = (0..8).map(|a| hex8::corner(a) * h * g[a].transpose()).sum();
             assert!((moments - Mat3::identity()).norm() < 1e-12);
@@ -194,10 +168,7 @@ mod tests {
 
     #[test]
     fn a_half_filled_voxel_carries_half_the_uniform_energy() {
-        let mut half = OccupancyMask::default();
-        (0..SUBCELLS * SUBCELLS * SUBCELLS)
-            .filter(|cell| cell % SUBCELLS < SUBCELLS / 2)
-            .for_each(|cell| half.insert(cell));
+        let half = OccupancyMask::from_fn(|cell| cell % SUBCELLS < SUBCELLS / 2);
         let u = field(0.01, |x| Vec3::new(x.x, 0.0, 0.0));
         let energy = |fill: &OccupancyMask| {
             let k = stiffness(0.01, fill, &ElasticMaterial::new(1e4, 0.2, 1.0).expect("valid"));

@@ -132,10 +132,7 @@ mod tests {
         element::{mean_gradients, stiffness},
     };
     use proptest::prelude::*;
-    use softvt_geometry::{
-        Quat, hex8,
-        voxel::{OccupancyMask, SUBCELLS},
-    };
+    use softvt_geometry::{Quat, hex8, voxel::OccupancyMask};
 
     const H: f64 = 0.01;
     fn material() -> ElasticMaterial {
@@ -148,16 +145,11 @@ mod tests {
 
     /// Fills of a voxel: full, a half, a thin layer, one corner.
     fn fills() -> [OccupancyMask; 4] {
-        let part = |keep: fn(usize) -> bool| {
-            let mut fill = OccupancyMask::default();
-            (0..SUBCELLS.pow(3)).filter(|&cell| keep(cell)).for_each(|cell| fill.insert(cell));
-            fill
-        };
         [
             OccupancyMask::full(),
-            part(|cell| cell % 6 < 3),
-            part(|cell| cell < 36),
-            part(|cell| cell % 6 < 2 && cell < 80),
+            OccupancyMask::from_fn(|cell| cell % 6 < 3),
+            OccupancyMask::from_fn(|cell| cell < 36),
+            OccupancyMask::from_fn(|cell| cell % 6 < 2 && cell < 80),
         ]
     }
 
