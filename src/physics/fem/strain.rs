@@ -4,6 +4,8 @@
 //! rotations. `σ_min` has the sign of `det F`, so that an inverted point has a strain above 1. A point counts with an
 //! eighth of its voxel's filled volume. Voxels filled by less than a tenth are not counted.
 
+use nalgebra::Vector3;
+
 use super::{
     body::{FemModel, FemState},
     force::{ElementCorners, gauss_gradients},
@@ -174,36 +176,25 @@ impl StrainMeter {
     /// `length` 0, is singular at the edge of a pad, and its percentiles depend on the voxels.
     pub fn percentile(&self, state: &FemState, tail: f64, length: f64) -> f64 {
         let mesh = &state.model.mesh;
-        let local: Vec<[f64; POINTS]> = (0..self.share.len())
-            .map(|element| {
-                if self.share[element] > 0.0 {
-                    gradients_of(state, element).map(|f| compressive_strain(&f))
-                } else {
-                    [0.0; POINTS]
-                }
-            })
-            .collect();
+        let strains = |(element, &share): (usize, &f64)| match share > 0.0 {
+            true => gradients_of(state, element).map(|f| compressive_strain(&f)),
+            false => [0.0; POINTS],
+        };
+        let local: Vec<[f64; POINTS]> = self.share.iter().enumerate().map(strains).collect();
         if local.iter().flatten().any(|strain| !strain.is_finite()) {
             return f64::NAN;
         }
-        let around = Neighbours::new(mesh.edge, length);
+        let around = neighbours(mesh.edge, length);
         let mut points: Vec<WeightedStrain> = Vec::new();
         for (element, &share) in self.share.iter().enumerate().filter(|(_, share)| **share > 0.0) {
             let corner = mesh.nodes[mesh.elements[element][0] as usize];
             let cell = ((corner - mesh.origin) / mesh.edge).map(|at| at.round() as i64);
             for (point, own) in local[element].iter().enumerate() {
                 let (mut sum, mut weights) = (share * own, share);
-                for near in &around.of_point[point] {
-                    let at = cell + near.cell;
-                    let is_inside = (0..3).all(|axis| at[axis] >= 0 && at[axis] < mesh.grid[axis] as i64);
-                    if !is_inside {
-                        continue;
-                    }
-                    let [nx, ny, _] = mesh.grid;
-                    let index = at.x as usize + nx * (at.y as usize + ny * at.z as usize);
-                    let Some(&share) = self.share.get(mesh.cell_element[index] as usize) else { continue };
-                    let weight = share * near.weight;
-                    sum += weight * local[mesh.cell_element[index] as usize][near.point];
+                for near in &around[point] {
+                    let Some(element) = mesh.element_at((cell + near.cell).into()) else { continue };
+                    let weight = self.share[element as usize] * near.weight;
+                    sum += weight * local[element as usize][near.point];
                     weights += weight;
                 }
                 points.push(WeightedStrain { strain: sum / weights, share });
@@ -219,41 +210,31 @@ impl StrainMeter {
     }
 }
 
-/// Gauss points within a length of each Gauss point of a voxel, without itself.
-struct Neighbours {
-    of_point: [Vec<Neighbour>; POINTS],
-}
-
 /// A Gauss point near another.
 struct Neighbour {
     /// Voxel relative to the other's.
-    cell: nalgebra::Vector3<i64>,
+    cell: Vector3<i64>,
     /// Index in its voxel.
     point: usize,
     /// Weight of its strain, 0..1.
     weight: f64,
 }
 
-impl Neighbours {
-    fn new(edge: f64, length: f64) -> Self {
-        let (gauss, reach) = (hex8::gauss_points(), (length / edge).ceil() as i64);
-        let offsets = || {
-            (-reach..=reach).flat_map(move |z| {
-                (-reach..=reach)
-                    .flat_map(move |y| (-reach..=reach).map(move |x| nalgebra::Vector3::new(x, y, z)))
-            })
+/// Gauss points within a length of each Gauss point of a voxel of this edge, without itself.
+fn neighbours(edge: f64, length: f64) -> [Vec<Neighbour>; POINTS] {
+    let (gauss, reach) = (hex8::gauss_points(), (length / edge).ceil() as i64);
+    let side = 2 * reach + 1;
+    let cells =
+        (0..side.pow(3)).map(|k| Vector3::new(k % side, k / side % side, k / side / side).add_scalar(-reach));
+    std::array::from_fn(|own| {
+        let near = |cell: Vector3<i64>, point: usize| {
+            let away = (cell.map(|at| at as f64) + gauss[point] - gauss[own]) * edge;
+            let share = 1.0 - away.norm_squared() / (length * length);
+            let is_other = cell != Vector3::zeros() || point != own;
+            (is_other && share > 0.0).then_some(Neighbour { cell, point, weight: share * share })
         };
-        let of_point = std::array::from_fn(|own| {
-            let near = |cell: nalgebra::Vector3<i64>, point: usize| {
-                let away = (cell.map(|at| at as f64) + gauss[point] - gauss[own]) * edge;
-                let share = 1.0 - away.norm_squared() / (length * length);
-                let is_other = cell != nalgebra::Vector3::zeros() || point != own;
-                (is_other && share > 0.0).then_some(Neighbour { cell, point, weight: share * share })
-            };
-            offsets().flat_map(|cell| (0..POINTS).filter_map(move |point| near(cell, point))).collect()
-        });
-        Self { of_point }
-    }
+        cells.clone().flat_map(|cell| (0..POINTS).filter_map(move |point| near(cell, point))).collect()
+    })
 }
 
 /// Bits of the Gauss points of an element beyond each limit.
