@@ -14,7 +14,7 @@ use super::{
 use softvt_benchmark::CONTROL_DT;
 use softvt_common::{cancel, text::hex};
 use softvt_evaluation::deformation::ReferenceShape;
-use softvt_geometry::{Aabb, Pose, Vec3, voxel::VolumeProduct};
+use softvt_geometry::{Aabb, Pose, Vec3};
 use softvt_physics::{
     BodyId, ColliderId, ContactPartner, PhysicsParams, World,
     contact::Friction,
@@ -306,8 +306,7 @@ impl Simulation {
     pub fn present_shape(&self, object: &ObjectInstance) -> Option<ReferenceShape> {
         let BodyId::Soft(id) = object.body else { return None };
         let body = &self.world.soft(id).state;
-        let shape = ReferenceShape::of_mesh(&body.x, VolumeProduct::new(&body.model.mesh)).ok()?;
-        Some(shape.with_diagonal(object.bounds.size().norm()))
+        ReferenceShape::of_mesh(&body.x, &body.model.mesh, object.bounds.size().norm()).ok()
     }
 
     /// Weight of an object, N; 0 for fixed objects and parts.

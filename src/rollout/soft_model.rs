@@ -173,7 +173,7 @@ fn size_problem(size: &Vec3, material: &SoftMaterial) -> Option<String> {
 mod tests {
     use super::*;
     use softvt_evaluation::deformation::ReferenceShape;
-    use softvt_geometry::{Pose, Vec3, voxel::VolumeProduct};
+    use softvt_geometry::{Pose, Vec3};
     use softvt_physics::{BodyId, PhysicsParams, World, contact::Friction, fem::ElasticMaterial};
 
     const RADIUS: f64 = 0.03;
@@ -202,8 +202,9 @@ mod tests {
             let frame = world.add_kinematic(at(side, RADIUS * scale));
             (side, frame, world.add_shape("plate", frame, Pose::identity(), &plate, Friction::NONE))
         });
-        let rest = ReferenceShape::of_mesh(&world.soft(body).state.x, VolumeProduct::new(&model.mesh))
-            .expect("a shape");
+        let diagonal_m = shape.bounds().size().norm() * scale;
+        let rest = ReferenceShape::of_mesh(&world.soft(body).state.x, &model.mesh, diagonal_m);
+        let rest = rest.expect("a shape");
         for step in 1..=40 {
             let closed = f64::from(step.min(20)) / 20.0;
             let gap = RADIUS * scale * (1.0 - closed * (1.0 - share));

@@ -1,7 +1,7 @@
 //! FEM-RMS deformation D: distance of a soft body from its reference shape after removal of the rigid motion.
 //!
 //! With positions `x` now and `X` in the reference shape, their means `c` and `C` over the volume `V`, and the diagonal
-//! `d` of the bounding box of the object as modelled ([`ReferenceShape::with_diagonal`]):
+//! `d` of the bounding box of the object as modelled ([`ReferenceShape::of_mesh`]):
 //!
 //! `D = 100 % · sqrt( 1/V ∫ |x − c − R (X − C)|² dV ) / d`
 //!
@@ -20,7 +20,10 @@ pub mod series;
 
 use nalgebra::{Matrix4, Quaternion, SymmetricEigen};
 
-use softvt_geometry::{Aabb, Mat3, Quat, Vec3, voxel::VolumeProduct};
+use softvt_geometry::{
+    Aabb, Mat3, Quat, Vec3,
+    voxel::{VolumeProduct, VoxelMesh},
+};
 
 /// Name of D as it is scored: integrated over the volume, of the diagonal along the axes of the object.
 pub const METRIC_ID: &str = "fem_volume_rms_rigid_aligned_object_bbox_pct_v2";
@@ -123,28 +126,23 @@ impl ReferenceShape {
         Ok(Self { nodes, weights, weighted_centre, products, elements: None, bbox_m, diagonal_m })
     }
 
-    /// Prepares a reference of a body whose mesh has this product over its volume and these `nodes` (m, any frame).
+    /// Prepares a reference of a body with this `mesh`, whose nodes are at `nodes` (m, any frame). The bounding box of
+    /// the object along its own axes has the diagonal `diagonal_m`, m.
     ///
     /// # Errors
     /// As [`ReferenceShape::new`].
-    pub fn of_mesh(nodes: &[Vec3], product: VolumeProduct) -> Result<Self, DeformationError> {
+    pub fn of_mesh(nodes: &[Vec3], mesh: &VoxelMesh, diagonal_m: f64) -> Result<Self, DeformationError> {
+        let product = VolumeProduct::new(mesh);
         let volumes: Vec<f64> = product.times(nodes.len(), |_| Vec3::x()).iter().map(|sum| sum.x).collect();
         let mut reference = Self::new(nodes, &volumes)?;
         let per_volume = 1.0 / volumes.iter().sum::<f64>();
         let products = product.times(nodes.len(), |node| reference.nodes[node]);
         reference.products = products.iter().map(|sum| sum * per_volume).collect();
         reference.elements = Some((product, per_volume));
-        Ok(reference)
+        Ok(Self { diagonal_m, ..reference })
     }
 
-    /// The same reference of an object whose bounding box along its own axes has this diagonal, m. Without this, it is
-    /// the box of the nodes in their frame.
-    #[must_use]
-    pub fn with_diagonal(self, diagonal_m: f64) -> Self {
-        Self { diagonal_m, ..self }
-    }
-
-    /// Diagonal of the bounding box of the object along its own axes, m.
+    /// Diagonal of the bounding box of the object along its own axes, m; that of the nodes if it has no mesh.
     pub fn diagonal_m(&self) -> f64 {
         self.diagonal_m
     }

@@ -46,8 +46,10 @@ fn a_deformation_does_not_depend_on_how_the_object_lies() {
     for degrees in [0.0_f64, 10.0, 45.0, 90.0] {
         let turn = Quat::from_axis_angle(&Vec3::z_axis(), degrees.to_radians());
         let [lying, now] = [&nodes, &squeezed(&nodes, 0.1)].map(|x| map(x, |x| turn * x));
-        let reference = ReferenceShape::new(&lying, &weights).unwrap();
-        let reference = reference.with_diagonal(0.06 * 3.0_f64.sqrt());
+        let reference = ReferenceShape {
+            diagonal_m: 0.06 * 3.0_f64.sqrt(),
+            ..ReferenceShape::new(&lying, &weights).unwrap()
+        };
         assert!((reference.measure(&now).unwrap().rms_pct - 2.0).abs() < 0.051, "{degrees}");
     }
 }

@@ -24,12 +24,12 @@ use softvt_common::{
     parallel::lock,
     text::{format_number, significant},
 };
-use softvt_evaluation::deformation::{Deformation, DeformationError, ReferenceShape};
-use softvt_geometry::{Pose, Quat, Vec3, shape::Shape, voxel::VolumeProduct};
+use softvt_evaluation::deformation::{Deformation, ReferenceShape};
+use softvt_geometry::{Pose, Quat, Vec3, shape::Shape};
 use softvt_physics::{
     AttachmentId, BodyId, ColliderId, ContactPartner, KinematicId, PhysicsParams, SoftId, World,
     contact::{Collider, Friction, SurfaceStiffness},
-    fem::{FemModel, FemState, StrainLimits, StrainMeter},
+    fem::{FemState, StrainLimits, StrainMeter},
     world::{ContactSummary, Penetration, SoftBody, StepFailure},
 };
 use softvt_robot::{PadSpec, pads::PadSurface};
@@ -159,16 +159,6 @@ struct MeasuredBody {
     stable_strain: Option<f64>,
 }
 
-/// The shape of a body whose nodes are at `nodes`, for measuring deformations from it.
-fn reference_shape(
-    nodes: &[Vec3],
-    model: &FemModel,
-    shape: &Shape,
-) -> Result<ReferenceShape, DeformationError> {
-    let reference = ReferenceShape::of_mesh(nodes, VolumeProduct::new(&model.mesh))?;
-    Ok(reference.with_diagonal(shape.bounds().size().norm()))
-}
-
 struct Inner {
     world: World,
     /// Soft bodies by their index in the world.
@@ -286,7 +276,8 @@ impl LuaWorld {
                 .map_err(|e| wrong(&e))?
         };
         let reserved = reserve_in_world(lua, model.bytes())?;
-        let reference = reference_shape(&model.mesh.nodes, &model, shape).map_err(|e| wrong(&e))?;
+        let (mesh, diagonal_m) = (&model.mesh, shape.bounds().size().norm());
+        let reference = ReferenceShape::of_mesh(&mesh.nodes, mesh, diagonal_m).map_err(|e| wrong(&e))?;
         let strain = StrainMeter::new(&model, StrainLimits::default());
         let id = inner.world.add_soft(name, model, Some(Arc::new(shape.clone())), &pose, friction);
         let (shape, stable_strain) = (shape.clone(), body.stable_strain());
@@ -556,10 +547,12 @@ class! {
             /// Sets the reference shape of deformation: the rest shape (at the start) or the present one.
             fn set_reference(lua, this, which: String = Type::Choice(&["rest", "now"])) -> [] {
                 let mut inner = lock(&this.world);
-                let state = &inner.world.soft(this.id).state;
-                let nodes = if which == "rest" { &state.model.mesh.nodes } else { &state.x };
-                let reference = reference_shape(nodes, &state.model, &inner.bodies[this.id.index()].shape);
-                inner.bodies[this.id.index()].reference = reference.map_err(|e| fail(lua, e.to_string()))?;
+                let Inner { world, bodies, .. } = &mut *inner;
+                let (state, reference) = (&world.soft(this.id).state, &mut bodies[this.id.index()].reference);
+                let mesh = &state.model.mesh;
+                let nodes = if which == "rest" { &mesh.nodes } else { &state.x };
+                let renewed = ReferenceShape::of_mesh(nodes, mesh, reference.diagonal_m());
+                *reference = renewed.map_err(|e| fail(lua, e.to_string()))?;
             }
             /// Returns the normal force of a solid on the body, N.
             fn force(lua, this, solid: LuaSolid) -> ["number"] { this.contact(lua, "force", &solid)?.normal_force }
