@@ -63,7 +63,7 @@ pub fn run<E: From<RunError>>(
     }
     let mut tables = Vec::new();
     for ((suite, cases), runs) in suites.iter().zip(&cases).zip(prepared) {
-        let compared = compare_conditions(config, suite, cases, runs)?;
+        let compared = compare_conditions(config, suite, cases, runs, out)?;
         tables.push(compared);
         on_suite(&tables)?;
     }
@@ -260,23 +260,26 @@ fn compare_conditions(
     suite: &Suite,
     cases: &[ConditionCase],
     runs: Vec<Option<PreparedRun>>,
+    out: &Path,
 ) -> Result<ConditionTable, RunError> {
     let mut marks = MethodMarks { privileged: config.policy.privileged, ..MethodMarks::default() };
-    let (mut reference, mut recorded) = (None, None::<PathBuf>);
+    let mut reference = None;
     let mut rows = Vec::new();
     for (case, run) in cases.iter().zip(runs) {
         let mut outcome = None;
-        let mut repeating = case.config.clone();
-        let run = match (run, case.condition.replay, &recorded) {
-            (Some(run), true, Some(folder)) => Some(repeat(folder, &run, &mut repeating)?),
-            (run, ..) => run,
-        };
-        if let Some(run) = run {
+        let repeating;
+        if let Some(mut run) = run {
+            if case.condition.replay {
+                // The reference is the first, and always applies.
+                let policy = PolicySource::Run(out.join(&cases[0].folder));
+                let policy = PolicyConfig::load(&PolicyOptions { policy, ..PolicyOptions::default() })?;
+                repeating = RunConfig { policy, ..case.config.clone() };
+                run = with_config(&run, &repeating)?;
+            }
             let (name, number) = (text::escape_control(&case.condition.name), rows.len() + 1);
             config.notice(format_args!("{}, {name} ({number} of {})", suite.name, cases.len()));
             let result = run_suite(&run, &mut |_| ())?;
             outcome = Some(ConditionOutcome::new(case.folder.clone(), &result.records, reference.as_deref()));
-            recorded = recorded.or_else(|| run.out.clone());
             reference.get_or_insert(result.records);
             marks.force_observed |= result.summary.force_observed;
             marks.replayed |= result.summary.replayed && !case.condition.replay;
@@ -299,14 +302,8 @@ fn compare_conditions(
     Ok(ConditionTable { suite: config.suite_name(suite), policy, deformable, rows })
 }
 
-/// The same run with the actions of the run in `folder` in place of its policy; `config` becomes its configuration.
-fn repeat<'a>(
-    folder: &Path,
-    run: &PreparedRun<'a>,
-    config: &'a mut RunConfig,
-) -> Result<PreparedRun<'a>, RunError> {
-    let policy = PolicySource::Run(folder.to_owned());
-    config.policy = PolicyConfig::load(&PolicyOptions { policy, ..PolicyOptions::default() })?;
+/// The same run with another configuration.
+fn with_config<'a>(run: &PreparedRun<'a>, config: &'a RunConfig) -> Result<PreparedRun<'a>, RunError> {
     let again = SuiteRun::new(config, run.loaded, run.suite, run.jobs.clone(), run.split)?;
     SuiteRun { out: run.out.clone(), ..again }.prepare_like(run)
 }
