@@ -80,12 +80,13 @@ local HOLD_S = 1 -- hold after the lift, s
 local SPREADS = { trial.DISPLACEMENT, grasp.SPREAD }
 local TRIALS = { "trials", "expert_trials" }
 
--- Changes of the sweep by name, in the order of the page.
+-- Changes of the sweep by name, in the order of the page: factors on its step and the size of the object, and on the
+-- resolution of the mesh of the strains, for that mesh (`fine`) or for the mesh of widths, forces and D (`resolution`).
 local CHANGES = {
   { name = "nominal" },
   { name = "half_step", step = 0.5 },
-  { name = "finer", refined = 4 / 3 },
-  { name = "converged", refined = 1 },
+  { name = "finer", fine = 4 / 3 },
+  { name = "converged", resolution = 1 },
   { name = "scale_0.9", scale = 0.9 },
   { name = "scale_1.1", scale = 1.1 },
 }
@@ -104,11 +105,14 @@ end
 
 -- D_ref of the sweep with one change, and D and force at the tight end of the window and at D_ref.
 local function numerics(point, o)
-  local asset, known, change = assets[point.asset], calibrations[point.asset], { scale = point.change.scale }
+  local asset, known, change = assets[point.asset], calibrations[point.asset], point.change
   local fine = press.fine_resolution(asset, change)
-  if point.change.name == "finer" then change.fine = math.ceil(point.change.refined * fine) end
-  if point.change.name == "converged" then change.resolution = fine end
-  local sweep = press.sweep(asset, 1e-3 * o.step_mm * (point.change.step or 1), change)
+  local function finer(factor) return factor and math.ceil(factor * fine) end
+  local sweep = press.sweep(asset, 1e-3 * o.step_mm * (change.step or 1), {
+    scale = change.scale,
+    fine = finer(change.fine),
+    resolution = finer(change.resolution),
+  })
   local found = softvt.envelope {
     asset = point.asset,
     stable_strain = sweep.stable_strain,
@@ -120,7 +124,7 @@ local function numerics(point, o)
   local d_end_pct, force_end_n = at_width(sweep.rows, known and known.width_at_d_ref_mm)
   return {
     asset = point.asset,
-    check = point.change.name,
+    check = change.name,
     d_ref_pct = found.d_ref,
     censored = found.censored,
     d_tight_pct = d_tight_pct,

@@ -232,22 +232,14 @@ function press.fine_resolution(asset, change)
   return math.max(FINE, needed, asset.body.resolution)
 end
 
--- A copy of `change` with another resolution.
-local function at_resolution(change, resolution)
-  local copy = { resolution = resolution }
-  for key, value in pairs(change) do
-    copy[key] = copy[key] or value
-  end
-  return copy
-end
-
 -- Strain over D of a press on a fine mesh, up to the stable strain: a list of { d_pct, strain }, whose field `ended`
 -- says why it ended before, if it did. The strain is the 95th percentile of the volume, each point's averaged over
 -- STRAIN_LENGTH. nil if the material has no stable strain. It hardly depends on the stiffness: from 0.3 to 30 times
 -- that of the cube, D at the stable strain changes by 0.9 %.
 function press.strains(asset, change)
   change = change or {}
-  local fine = at_resolution(change, change.fine or press.fine_resolution(asset, change))
+  local resolution = change.fine or press.fine_resolution(asset, change)
+  local fine = setmetatable({ resolution = resolution }, { __index = change })
   local bench, problem, stable_strain = press.bench(asset, fine)
   if not stable_strain then return nil end
   if not bench then return { ended = problem } end
@@ -285,28 +277,21 @@ end
 function press.sweep(asset, step, change, strains)
   change = change or {}
   local bench, problem, stable_strain = press.bench(asset, change)
-  local sweep = { rows = {}, stable_strain = stable_strain, ended = problem }
-  if not bench then return sweep end
-  sweep.tilt_deg = bench.tilt and math.deg(bench.tilt)
-  if not stable_strain then
-    sweep.rows, sweep.ended = press_in(bench, CONTACT_STEP, step, function(row)
-      row.strain_p95 = bench.body:strain_percentile(PERCENTILE)
-      return false
+  if not bench then return { rows = {}, stable_strain = stable_strain, ended = problem } end
+  local known = stable_strain and (strains or press.strains(asset, change))
+  local rows, ended = {}, nil
+  if not known or #known > 1 then
+    rows, ended = press_in(bench, CONTACT_STEP, step, function(row)
+      row.strain_p95 = known and strain_at(known, row.d_pct) or bench.body:strain_percentile(PERCENTILE)
+      return known and (row.strain_p95 >= stable_strain or known.ended and row.d_pct >= known[#known].d_pct)
     end)
-    return sweep
   end
-  local known = strains or press.strains(asset, change)
-  if #known < 2 then
-    sweep.ended = known.ended
-    return sweep
-  end
-  sweep.rows, sweep.ended = press_in(bench, CONTACT_STEP, step, function(row)
-    row.strain_p95 = strain_at(known, row.d_pct)
-    if known.ended and row.d_pct >= known[#known].d_pct then return true end
-    return row.strain_p95 >= stable_strain
-  end)
-  sweep.ended = sweep.ended or known.ended
-  return sweep
+  return {
+    rows = rows,
+    stable_strain = stable_strain,
+    ended = ended or known and known.ended,
+    tilt_deg = bench.tilt and math.deg(bench.tilt),
+  }
 end
 
 -- Minimum-jerk time scaling on [0, 1] (Flash and Hogan, 1985), and its largest slope.
