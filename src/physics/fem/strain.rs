@@ -367,12 +367,8 @@ mod tests {
         }
         let meter = StrainMeter::new(&state.model, StrainLimits::default());
         // Voxels have one strain each along y: (2k + 1)/12 of the largest, 0.2.
-        let expected = 0.2 * 11.0 / 12.0;
-        assert!(
-            (meter.percentile(&state, 0.05, 0.0) - expected).abs() < 1e-9,
-            "{}",
-            meter.percentile(&state, 0.05, 0.0)
-        );
+        let (expected, found) = (0.2 * 11.0 / 12.0, meter.percentile(&state, 0.05, 0.0));
+        assert!((found - expected).abs() < 1e-9, "{found}");
         assert!((meter.share_beyond(&state, 0.1) - 0.5).abs() < 1e-12);
     }
 

@@ -33,11 +33,7 @@ impl StepMeans {
     }
 
     fn add_contacts<'a>(&mut self, parts: impl Iterator<Item = &'a Vec<BodyContact>>, share: f64) {
-        for (index, part) in parts.enumerate() {
-            if index == self.contacts.len() {
-                self.contacts.push(Vec::new());
-            }
-            let sums = &mut self.contacts[index];
+        for (sums, part) in self.contacts.iter_mut().zip(parts) {
             for BodyContact { partner, summary } in part {
                 let at = sums.iter().position(|sum| sum.partner == *partner).unwrap_or_else(|| {
                     sums.push(BodyContact { partner: *partner, summary: ContactSummary::default() });
@@ -83,6 +79,7 @@ impl World {
             factorizations: means.stats.factorizations + factorizations,
         };
         let soft = self.soft.iter().map(|soft| &soft.contacts);
+        means.contacts.resize_with(self.soft.len() + self.rigid.len(), Vec::new);
         means.add_contacts(soft.chain(self.rigid.iter().map(|rigid| &rigid.contacts)), share);
         let forces = || self.articulations.iter().flat_map(|articulation| &articulation.drive_forces);
         means.drive_forces.resize(forces().count(), 0.0);
