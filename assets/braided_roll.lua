@@ -31,7 +31,7 @@ end
 return softvt.asset {
   name = "braided_roll",
   shape = braid:subtract(TABLE_TOP, 4 * mm),
-  -- At six voxels a length, three across, the braid is half again too stiff between pads; at twelve it is 5 % so.
+  -- It is 5.2 voxels wide; with the usual six along its length it would be 2.6.
   body = softvt.soft {
     youngs_pa = 90e3,
     poisson = 0.37,

@@ -45,8 +45,7 @@ table.insert(crust.layers, {
 return softvt.asset {
   name = "long_roll",
   shape = slashed,
-  -- Squeezed by a fifth it is within 8 % of 18 voxels a length; at eight voxels, three across, it would be 14 % too
-  -- stiff.
+  -- It is 4.4 voxels wide; with the usual six along its length it would be 2.2.
   body = softvt.soft {
     youngs_pa = 35e3,
     poisson = 0.32,
