@@ -108,18 +108,11 @@ local function numerics(point, o)
   local asset, known, change = assets[point.asset], calibrations[point.asset], point.change
   local fine = press.fine_resolution(asset, change)
   local function finer(factor) return factor and math.ceil(factor * fine) end
-  local sweep = press.sweep(asset, 1e-3 * o.step_mm * (change.step or 1), {
+  local found, sweep = press.envelope(asset, 1e-3 * o.step_mm * (change.step or 1), {
     scale = change.scale,
     fine = finer(change.fine),
     resolution = finer(change.resolution),
   })
-  local found = softvt.envelope {
-    asset = point.asset,
-    stable_strain = sweep.stable_strain,
-    ended = sweep.ended,
-    sweep = sweep.rows,
-    holds = {},
-  }
   local d_tight_pct, force_tight_n = at_width(sweep.rows, known and known.window.tight.width_mm)
   local d_end_pct, force_end_n = at_width(sweep.rows, known and known.width_at_d_ref_mm)
   return {

@@ -59,14 +59,7 @@ local function run(point, o)
     density_factor = one.density_factor,
     strain_factor = one.strain_factor,
   }
-  local sweep = press.sweep(assets[point.asset], STEP, change)
-  local pressed = softvt.envelope {
-    asset = point.asset,
-    stable_strain = sweep.stable_strain,
-    ended = sweep.ended,
-    sweep = sweep.rows,
-    holds = {},
-  }
+  local pressed = press.envelope(assets[point.asset], STEP, change)
   local window = grasp.window(one)
   local loose, tight = carry.ends(assets[point.asset], one, window, point.index)
   return {

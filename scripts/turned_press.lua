@@ -3,7 +3,7 @@
 --
 --   softvt scripts/turned_press.lua --asset ball,sphere --turn 0,30,45 --resolution 6,12 --json
 local grasp = require "experts.grasp"
-local table_top = require "assets.table"
+local press = require "calibration.press"
 
 local STEP = 2e-4 -- step of the width, m
 local CLOSING = 0.02 -- speed of each pad, m/s
@@ -67,13 +67,7 @@ local function build(point)
   }
   local window = softvt.grip_window { asset = asset.name }
   if opt.turned == "voxels" then shape = shape:rotate { axis = "z", angle = turn } end
-  local world = softvt.world { sleeping = false }
-  world:static {
-    name = "table",
-    shape = softvt.shape.box { size = { 1, 1, 0.1 } },
-    friction = table_top.friction,
-    position = { 0, 0, -0.05 },
-  }
+  local world = press.world()
   local body = world:soft {
     name = asset.name,
     shape = shape,

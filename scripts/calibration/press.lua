@@ -71,6 +71,18 @@ local function instance(asset, change)
   }
 end
 
+-- A world in which bodies stay awake, with the top of the table at z = 0.
+function press.world()
+  local world = softvt.world { sleeping = false }
+  world:static {
+    name = "table",
+    shape = softvt.shape.box { size = { 1, 1, 0.1 } },
+    friction = table_top.friction,
+    position = { 0, 0, -0.05 },
+  }
+  return world
+end
+
 local Bench = {}
 Bench.__index = Bench
 
@@ -137,13 +149,7 @@ function Bench:both_touch() return math.min(self:force(1), self:force(2)) > tria
 -- scale, resolution, youngs_factor, density_factor and strain_factor.
 function press.bench(asset, change, offset)
   local made = instance(asset, change or {})
-  local world = softvt.world { sleeping = false }
-  world:static {
-    name = "table",
-    shape = softvt.shape.box { size = { 1, 1, 0.1 } },
-    friction = table_top.friction,
-    position = { 0, 0, -0.05 },
-  }
+  local world = press.world()
   local body = world:soft {
     name = asset.name,
     shape = made.shape,
@@ -292,6 +298,19 @@ function press.sweep(asset, step, change, strains)
     ended = ended or known and known.ended,
     tilt_deg = bench.tilt and math.deg(bench.tilt),
   }
+end
+
+-- The envelope of a sweep without hold trials, and the sweep. Parameters are those of press.sweep.
+function press.envelope(asset, step, change)
+  local sweep = press.sweep(asset, step, change)
+  local envelope = softvt.envelope {
+    asset = asset.name,
+    stable_strain = sweep.stable_strain,
+    ended = sweep.ended,
+    sweep = sweep.rows,
+    holds = {},
+  }
+  return envelope, sweep
 end
 
 -- Minimum-jerk time scaling on [0, 1] (Flash and Hogan, 1985), and its largest slope.
