@@ -107,7 +107,7 @@ fn turned(report: &mut Report) {
 fn moving(report: &mut Report) {
     println!(
         "\nPeak of D over D at rest of a long body (capsule of 40 × 160 mm, 30 kPa) that is lifted by 0.1 m in 0.4 s. Speed after an impact over \
-         that before, of a soft ball of 50 mm (30 kPa) that falls by 0.1 m. Speed of such a ball after 3 s on a slope, m/s; a rigid one has {:.2} \
+         that before, of a soft ball of 50 mm (30 kPa) that falls by 0.1 m, by the height that it reaches. Speed of such a ball after 3 s on a slope, m/s; a rigid one has {:.2} \
          and {:.2}. At {} Hz, with β = 5 ms.\n",
         time_step::rolled_rigid(3f64.to_radians()),
         time_step::rolled_rigid(6f64.to_radians()),
