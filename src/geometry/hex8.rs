@@ -31,8 +31,7 @@ pub fn weights(xi: &Vec3) -> [f64; 8] {
 
 /// Local coordinates (each −1 or 1 over √3, mapped to `[0, 1]`) of the 2×2×2 Gauss points.
 pub fn gauss_points() -> [Vec3; 8] {
-    let at = |bit: usize| 0.5 + if bit == 1 { 0.5 } else { -0.5 } / 3f64.sqrt();
-    std::array::from_fn(|g| Vec3::new(at(g & 1), at(g >> 1 & 1), at(g >> 2 & 1)))
+    std::array::from_fn(|g| (0.5 * corner_sign(g) / 3f64.sqrt()).add_scalar(0.5))
 }
 
 /// A point of a quadrature rule in an element.

@@ -8,6 +8,7 @@ pub(crate) mod variation_file;
 
 use std::{
     collections::{BTreeMap, BTreeSet},
+    fmt::Display,
     path::Path,
     sync::Arc,
 };
@@ -500,17 +501,12 @@ fn condition(lua: &Lua, list: &Table, spec: &ConditionSpec) -> mlua::Result<Cond
         set.push((key.to_string()?, text));
     }
     // Ranges may depend on the settings of the suite and are checked with them.
-    Settings::default().check_fields(&set).map_err(|error| {
-        fail_at_key(lua, list, "conditions", format_args!("condition {:?}: set: {error}", spec.name))
-    })?;
+    let refused = |problem: &dyn Display| {
+        fail_at_key(lua, list, "conditions", format_args!("condition {:?}: {problem}", spec.name))
+    };
+    Settings::default().check_fields(&set).map_err(|error| refused(&format_args!("set: {error}")))?;
     if spec.replay && (spec.policy.is_some() || spec.rigid_twin) {
-        let problem = "replay repeats the actions of the reference; leave out policy and rigid_twin";
-        return Err(fail_at_key(
-            lua,
-            list,
-            "conditions",
-            format_args!("condition {:?}: {problem}", spec.name),
-        ));
+        return Err(refused(&"replay repeats the actions of the reference; leave out policy and rigid_twin"));
     }
     Ok(Condition {
         name: spec.name.clone(),
