@@ -98,7 +98,9 @@ pub fn restitution(rate: f64, average_acceleration: bool) -> f64 {
     }
     // The top of the parabola through the places around it.
     let [before, top, after] = last;
-    ((top + (after - before).powi(2) / (8.0 * (2.0 * top - before - after))) / height).sqrt()
+    let reached = top + (after - before).powi(2) / (8.0 * (2.0 * top - before - after));
+    // Implicit Euler leaves the ball below the place at which it first touched.
+    (reached / height).max(0.0).sqrt()
 }
 
 /// Speed of a soft ball after 3 s on a slope of `slope` rad, m/s. It starts at rest.
