@@ -6,6 +6,7 @@ mod gel;
 mod mixed;
 mod rigid;
 mod rounded;
+mod scans;
 mod scene;
 mod sleep;
 mod soft;

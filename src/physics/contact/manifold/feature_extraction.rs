@@ -11,7 +11,9 @@ use super::{
     flat_region::{FlatSample, flat_samples, project_to_surface},
 };
 use softvt_geometry::{
-    Mat3, Pose, Vec3, hex8, orthonormal_basis,
+    Mat3, Pose, Vec3, hex8,
+    mesh::Mesh,
+    orthonormal_basis,
     shape::{Polygon, Shape},
 };
 
@@ -34,6 +36,10 @@ const ON_AXIS: f64 = 1e-6;
 const SHARP_DISTANCE: f64 = 1e-4;
 /// Difference of these normals (chord of the unit circle, 20°) beyond which the edge is sharp.
 const SHARP_TURN: f64 = 0.35;
+/// Slope of an edge at a vertex of a mesh from which it descends from there.
+const VERTEX_SLOPE: f64 = 1e-4;
+/// Distance of a vertex from a sample on a sharp edge up to which they are one, m.
+const SAME_POINT: f64 = 1e-5;
 /// Area of a sample on a sharp edge, m²: several of them together carry as one point contact.
 pub(super) const SAMPLE_AREA: f64 = 0.25 * POINT_AREA;
 
@@ -55,27 +61,93 @@ pub struct SurfaceFeatures {
     pub(in super::super) corners: Vec<Vec3>,
     /// Circular edges of convex solids.
     pub(in super::super) rims: Vec<Rim>,
-    /// Samples of flat and nearly flat regions, and of finely rounded edges.
+    /// Samples of flat and nearly flat regions, and of finely rounded edges, and vertices of meshes.
     pub(in super::super) flat_samples: Vec<FlatSample>,
     /// Points spread over the whole surface, at which the search for the lowest point of a smooth part starts.
     pub(in super::super) seeds: Vec<Vec3>,
     /// Distance between neighbouring seeds, m.
     pub(in super::super) spacing: f64,
+    /// True if the shape has vertices of meshes.
+    pub(in super::super) has_vertices: bool,
 }
 
 impl SurfaceFeatures {
     /// Extracts the features of a shape. Those of boxes, cylinders and lathes are known exactly; the sharp edges and
     /// flat regions of other shapes are found on a grid of 1/24 of the longest side.
+    ///
+    /// A mesh touches with its vertices (Guendelman, Bridson & Fedkiw, SIGGRAPH 2003), which stay the same from step to
+    /// step. Facets that are smaller than the distance of the seeds have no seeds.
     pub fn of(shape: &Shape) -> Self {
         let mut features = Self::default();
         add_features(shape, &Pose::identity(), &mut features);
+        let vertices = mesh_vertices(shape);
+        features.has_vertices = !vertices.is_empty();
+        let is_new = |p: &Vec3, known: &[Vec3]| known.iter().all(|q| (p - q).norm() > SAME_POINT);
+        let convex = vertices.iter().filter(|v| v.is_convex && is_new(&v.p, &features.corners));
+        features.flat_samples.extend(convex.map(|v| FlatSample { p: v.p, area: POINT_AREA }));
         let size = shape.bounds().size().max();
         features.spacing = size / SEED_CELLS;
+        let is_on =
+            |p: &Vec3, v: &MeshVertex| v.longest_edge < features.spacing && (p - v.p).norm() < v.longest_edge;
         features.seeds = FeatureGrid::over(shape, features.spacing)
             .crossed()
             .map(|cell| project_to_surface(shape, cell.mean()))
+            .filter(|p| !vertices.iter().any(|v| is_on(p, v)))
             .collect();
         features
+    }
+}
+
+/// A vertex of a mesh.
+struct MeshVertex {
+    /// Position, m.
+    p: Vec3,
+    /// Length of the longest edge at it, m.
+    longest_edge: f64,
+    /// True if an edge descends from it; false on a flat and in a hollow.
+    is_convex: bool,
+}
+
+/// The vertices of the meshes that a shape is composed of.
+fn mesh_vertices(shape: &Shape) -> Vec<MeshVertex> {
+    match shape {
+        Shape::Placed { shape, pose } => {
+            let placed = |v: MeshVertex| MeshVertex { p: (pose * nalgebra::Point3::from(v.p)).coords, ..v };
+            mesh_vertices(shape).into_iter().map(placed).collect()
+        }
+        Shape::Scaled { shape, scale } => {
+            let scaled = |v: MeshVertex| MeshVertex {
+                p: scale.component_mul(&v.p),
+                longest_edge: scale.max() * v.longest_edge,
+                ..v
+            };
+            mesh_vertices(shape).into_iter().map(scaled).collect()
+        }
+        Shape::Paint { shape, .. } => mesh_vertices(shape),
+        Shape::Union(parts) => {
+            let is_outside = |v: &MeshVertex| shape.distance(&v.p) > -SAME_POINT;
+            parts.iter().flat_map(mesh_vertices).filter(is_outside).collect()
+        }
+        Shape::Mesh(solid) => {
+            let Mesh { vertices, triangles, .. } = solid.mesh();
+            let mut normals = vec![Vec3::zeros(); vertices.len()];
+            let corners = |t: &[u32; 3]| t.map(|v| (v as usize, vertices[v as usize]));
+            for [a, b, c] in triangles.iter().map(corners) {
+                let normal = (b.1 - a.1).cross(&(c.1 - a.1)).try_normalize(0.0).unwrap_or_default();
+                [a, b, c].into_iter().for_each(|(v, _)| normals[v] += normal);
+            }
+            let vertex = |p: &Vec3| MeshVertex { p: *p, longest_edge: 0.0, is_convex: false };
+            let mut out: Vec<MeshVertex> = vertices.iter().map(vertex).collect();
+            for [a, b, c] in triangles.iter().map(corners) {
+                for ((v, from), (_, to)) in [(a, b), (b, c), (c, a)] {
+                    let (edge, length) = (to - from, (to - from).norm());
+                    out[v].longest_edge = out[v].longest_edge.max(length);
+                    out[v].is_convex |= normals[v].dot(&edge) < -VERTEX_SLOPE * normals[v].norm() * length;
+                }
+            }
+            out
+        }
+        _ => Vec::new(),
     }
 }
 

@@ -5,6 +5,10 @@
 //! on which the lowest point is undefined: the ends of the line carry instead. Where corners, rims or flat samples
 //! touch as deep as a lowest point, they carry alone. A second support next to them, on the side to which a body
 //! happens to lean, would make it rock indefinitely.
+//!
+//! On a mesh, a search ends at an edge between two facets as often as at a vertex, and elsewhere in the next step, so
+//! that a support is missing in between: the body would rock as well. So it touches with its vertices, and no search
+//! starts on small facets, nor on large ones next to a vertex or an edge that is deeper.
 
 use std::f64::consts::{FRAC_PI_4, TAU};
 
@@ -21,6 +25,8 @@ use softvt_geometry::{Vec3, orthonormal_basis, shape::Shape};
 const PROBE_DISTANCE: f64 = 1e-3;
 /// Its upper limit in seed spacings, for small bodies.
 const PROBE_DISTANCE_RATIO: f64 = 1.0 / 6.0;
+/// Distance from a deeper point up to which no search starts on a mesh, in seed spacings.
+const CARRIED_DISTANCE: f64 = 2.0;
 /// Largest number of lowest points of one body.
 const MAX_LOWEST: usize = 6;
 /// First identifier of lowest points, four for each: the point and the ends of its line.
@@ -57,8 +63,14 @@ impl SurfaceInSdf<'_> {
         starts.retain(|(gap, _)| *gap < reach);
         starts.sort_by(|a, b| a.0.total_cmp(&b.0));
         let others = out.clone();
+        let apart = CARRIED_DISTANCE * features.spacing;
+        let is_carried = |gap: f64, p: &Vec3| {
+            let p_w = (probe.pose_b * (probe.a_in_b * nalgebra::Point3::from(*p))).coords;
+            let carries = |q: &ManifoldPoint| q.gap < gap && (q.position_w - p_w).norm() < apart;
+            features.has_vertices && others.iter().any(carries)
+        };
         let (mut used, mut found): (Vec<Vec3>, Vec<[Vec3; 2]>) = (Vec::new(), Vec::new());
-        for (_, start) in starts {
+        for (gap, start) in starts {
             if used.len() == MAX_LOWEST {
                 break;
             }
@@ -66,6 +78,7 @@ impl SurfaceInSdf<'_> {
                 |p: &Vec3, apart: f64| found.iter().any(|line| distance_to_segment(p, line) < apart);
             if used.iter().any(|p| (p - start).norm() < features.spacing)
                 || is_known(&start, features.spacing)
+                || is_carried(gap, &start)
             {
                 continue;
             }
