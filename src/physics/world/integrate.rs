@@ -112,10 +112,10 @@ mod tests {
         let end = &world.soft(id).state;
         let change =
             (angular_momentum(end) - angular_momentum(&start)).norm() / angular_momentum(&start).norm();
-        assert!(change < 1e-11, "{change}");
+        assert!(change < 1e-10, "{change}");
         let t = world.time();
         let centre = start.centre() + start.velocity() * t - Vec3::z() * (0.5 * 9.81 * t * t);
-        assert!((end.centre() - centre).norm() < 1e-12, "{} m, exact {centre}", end.centre());
+        assert!((end.centre() - centre).norm() < 1e-11, "{} m, exact {centre}", end.centre());
     }
 
     #[test]
@@ -157,7 +157,7 @@ mod tests {
     }
 
     #[test]
-    fn a_strained_body_that_is_let_go_gains_no_energy_in_flight() {
+    fn a_strained_body_that_is_let_go_never_exceeds_its_energy_in_flight() {
         // Slender, stiff and nearly incompressible: turns of its voxels in a step strain it most.
         for (poisson, spin, stretch, beta) in [
             (0.3, 0.0, 0.03, 2e-3),

@@ -252,9 +252,10 @@ impl World {
         self.stats = solved
             .map_err(|f| StepFailure::Diverged { step: self.step, residual_ratio: f.residual_ratio })?;
         self.complete();
-        let is_short = !self.moves_too_far();
+        let is_short = !self.strains_too_far();
         if !is_short {
             self.part_dt = 0.5 * self.params.dt;
+            self.means.add_stats(&self.stats);
         }
         Ok(is_short)
     }

@@ -99,13 +99,13 @@ pub(super) struct ColliderPoint {
     pub point: PatchPoint,
 }
 
-/// Energies of a world, J.
+/// Energies of a world, J. Those of soft bodies are at the time of their velocities: with average acceleration, the
+/// middle of the last step or part of one.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Energy {
     /// Kinetic energy of all bodies, J.
     pub kinetic: f64,
-    /// Elastic, of soft bodies, at the time of their velocities: with average acceleration, the middle of the last step
-    /// or part of one.
+    /// Elastic, of soft bodies.
     pub elastic: f64,
     /// Gravitational, zero at the world's origin.
     pub potential: f64,
@@ -297,7 +297,7 @@ impl World {
             then.update_elastic(0.0);
             energy.kinetic += soft.state.kinetic_energy();
             energy.elastic += then.elastic_energy;
-            energy.potential -= soft.state.model.total_mass() * self.gravity.dot(&soft.state.centre());
+            energy.potential -= then.model.total_mass() * self.gravity.dot(&then.centre());
         }
         for rigid in &self.rigid {
             energy.kinetic += rigid.state.kinetic_energy();

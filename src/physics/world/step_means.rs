@@ -27,6 +27,15 @@ impl StepMeans {
         self.points.clear();
     }
 
+    /// Adds the counts of a solve, also of one that was refused.
+    pub(super) fn add_stats(&mut self, found: &SolverStats) {
+        self.stats = SolverStats {
+            newton_steps: self.stats.newton_steps + found.newton_steps,
+            max_newton_steps: self.stats.max_newton_steps.max(found.max_newton_steps),
+            factorizations: self.stats.factorizations + found.factorizations,
+        };
+    }
+
     /// The points at which colliders pressed.
     pub(super) fn points(&self) -> &[ColliderPoint] {
         &self.points
@@ -72,12 +81,7 @@ impl World {
     /// Adds what a part of the step reports.
     pub(super) fn add_part(&mut self, share: f64) {
         let mut means = std::mem::take(&mut self.means);
-        let SolverStats { newton_steps, max_newton_steps, factorizations } = self.stats;
-        means.stats = SolverStats {
-            newton_steps: means.stats.newton_steps + newton_steps,
-            max_newton_steps: means.stats.max_newton_steps.max(max_newton_steps),
-            factorizations: means.stats.factorizations + factorizations,
-        };
+        means.add_stats(&self.stats);
         let soft = self.soft.iter().map(|soft| &soft.contacts);
         means.contacts.resize_with(self.soft.len() + self.rigid.len(), Vec::new);
         means.add_contacts(soft.chain(self.rigid.iter().map(|rigid| &rigid.contacts)), share);

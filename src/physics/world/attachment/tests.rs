@@ -74,7 +74,7 @@ fn a_body_and_the_load_on_it_keep_their_momenta_and_gain_no_energy_in_flight() {
             last = now;
         }
         let end = momenta(&world);
-        // Without that of the bonds.
+        // The elastic energy of the bonds is not counted.
         assert!(gain < 1e-5, "{spin}: {gain} of the energy");
         assert!((end.0 - start.0).norm() < 1e-10 * start.0.norm(), "{spin}: {start:?} {end:?}");
         assert!((end.1 - start.1).norm() < 1e-10 * start.1.norm(), "{spin}: {start:?} {end:?}");
@@ -182,8 +182,8 @@ fn a_body_on_a_hinged_link_swings_never_higher_than_it_started() {
             world.step().expect("a step");
             let z = world.soft(soft).state.centre().z;
             (highest, lowest) = (highest.max(z), lowest.min(z));
-            // Within a swing, the energy varies by an amount of the order of the step: positions move at the velocity
-            // of the end of the step.
+            // Within a swing, the energy varies by an amount of the order of the step: velocities are those of the
+            // middle of the steps.
             let gain = (world.energy().total() - start) / drop;
             assert!(gain < most, "{gain} of the drop at step {step} and {rate} Hz");
         }

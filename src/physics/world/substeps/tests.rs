@@ -146,6 +146,32 @@ fn a_divided_step_reports_the_means_of_its_parts() {
 }
 
 #[test]
+fn a_large_swing_is_not_damped_by_the_step() {
+    let range = |rate: f64| {
+        let mut world = World::new(
+            PhysicsParams { dt: 1.0 / rate, rayleigh_stiffness: 0.0, ..PhysicsParams::default() },
+            crate::STANDARD_GRAVITY,
+        );
+        let rubber = ElasticMaterial::new(3e5, 0.4, 1000.0).expect("valid");
+        let beam = Shape::cuboid(Vec3::new(0.1, 0.02, 0.02));
+        let beam = world.insert(SoftBodyBuilder::new(beam, rubber).resolution(10)).expect("a beam");
+        let end = Shape::cuboid(Vec3::repeat(0.02)).translated(Vec3::x() * -0.06);
+        world.attach(beam, &end, BodyId::World).expect("an end");
+        world.run(1.5).expect("steps that converge");
+        let heights: Vec<f64> = (0..(0.5 * rate) as usize)
+            .map(|_| {
+                world.step().expect("a step that converges");
+                world.soft(beam).state.centre().z
+            })
+            .collect();
+        heights.iter().copied().fold(f64::NEG_INFINITY, f64::max)
+            - heights.iter().copied().fold(f64::INFINITY, f64::min)
+    };
+    let [coarse, fine] = [60.0, 480.0].map(range);
+    assert!((coarse / fine - 1.0).abs() < 0.05, "{coarse} m at 60 Hz, {fine} m at 480 Hz");
+}
+
+#[test]
 fn the_first_part_of_a_step_takes_of_its_candidates_those_of_a_search() {
     let pairs = |world: &World| world.candidates.pairs().collect::<Vec<_>>();
     let mut world = empty();
