@@ -75,7 +75,7 @@ const MISSES: &str = "
 - Energy that seems to grow where a tall box falls over: velocities are those of the middle of the steps, and the kinetic energy at the end
   of one is taken as the mean of two.
 - In light grasps, D swings when the lift loads the object: nothing damps it but the material.
-- In a hand that shuts fully, single outer nodes of an object ring with up to 40 mm/s: average acceleration does not damp what the step does
+- In a hand that closes fully, single outer nodes of an object ring with up to 40 mm/s: average acceleration does not damp what the step does
   not resolve. D changes by less than 0.1 % (`standard_objects_rest_and_do_not_turn_inside_out_in_a_shut_hand`).
 - A thin wall that fills less than half of a voxel is too stiff in bending, by the 5 % that keeps almost empty voxels regular: a ring of
   60 mm with a wall of 4 mm has 1.9 times its force at the default resolution, 1.26 times with a wall of 8 mm. Give such shapes more voxels.

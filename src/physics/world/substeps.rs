@@ -99,8 +99,8 @@ impl World {
         Ok(())
     }
 
-    /// True if the solved motion strains a soft body too far for the present part of the step, which is not the
-    /// shortest.
+    /// True if the solved motion strains a soft body too far for the present part of the step. The shortest part is
+    /// never too long.
     pub(super) fn strains_too_far(&self) -> bool {
         let is_divisible = self.part_share() > 1.5 / f64::from(MAX_PARTS);
         self.params.average_acceleration

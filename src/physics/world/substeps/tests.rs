@@ -146,6 +146,30 @@ fn a_divided_step_reports_the_means_of_its_parts() {
 }
 
 #[test]
+fn a_part_that_is_solved_and_refused_leaves_nothing_behind() {
+    let [straight, refused] = [false, true].map(|is_refused| {
+        let mut world = Press::new().world;
+        (0..12).for_each(|_| world.step().expect("a step that converges"));
+        let place = Pose::translation(0.002, 0.0, 0.0305);
+        world.move_kinematic(Press::PLATE, place);
+        world.articulation_mut(Press::DRIVE).drives_mut()[0].as_mut().expect("a drive").target = 0.02;
+        world.begin_step();
+        if is_refused {
+            world.solve().expect("a step that converges");
+        }
+        world.step_in_parts(PARTS).expect("a step that converges");
+        assert_eq!(world.kinematic(Press::PLATE).pose, place);
+        world
+    });
+    let [q, other] = [&straight, &refused].map(|world| world.articulation(Press::DRIVE).state.q[0]);
+    assert!((q - other).abs() < 1e-12, "drive: {q} m, after a refused part {other} m");
+    let [x, other] = [&straight, &refused].map(|world| &world.soft(Press::CUBE).state.x);
+    let apart = x.iter().zip(other).map(|(a, b)| (a - b).norm()).fold(0.0, f64::max);
+    assert!(apart < 1e-9, "{apart} m");
+    assert_eq!(straight.soft(Press::CUBE).steps_awake, refused.soft(Press::CUBE).steps_awake);
+}
+
+#[test]
 fn a_large_swing_is_not_damped_by_the_step() {
     let range = |rate: f64| {
         let mut world = World::new(
