@@ -1,10 +1,10 @@
 //! Division of a step in which something moves far: an impact, a body that rolls, whips or springs back.
 //!
 //! A step linearises the elastic force and the place of each contact at its start, and an impact loses the energy of
-//! what moves along within it. So the step is divided, into up to 32 parts, until no node moves far in one against the
-//! size of its voxels: into a contact, around the centre of a body that touches, and relative to the rigid motion of
-//! any body. The velocities at the start predict that. A part whose solved motion strains a body too far is solved
-//! again, half as long. Average acceleration needs that; implicit Euler damps such motion.
+//! what moves along within it. So the step is divided, into up to 32 parts, until no node moves by more than a fraction
+//! of a voxel in a part: into a contact, relative to the centre of a body that touches, and relative to the rigid
+//! motion of any body. The velocities at the start predict that. A part whose solved motion strains a body too far is
+//! solved again, half as long. Average acceleration needs that; implicit Euler damps such motion.
 
 use super::{JointDrive, StepFailure, World};
 use crate::{
@@ -32,8 +32,9 @@ impl World {
         }
         let dt = self.params.dt;
         let parts = self.soft_ids().filter(|&id| !self.is_asleep(id)).map(|id| {
-            let FemState { model, v, .. } = &self.soft(id).state;
-            let straining = dt * largest_straining(&self.soft(id).state, v) / largest_way(model);
+            let body = &self.soft(id).state;
+            let FemState { model, v, .. } = body;
+            let straining = dt * largest_straining(body, v) / largest_way(model);
             if !self.candidates.involves(id) {
                 return straining;
             }
@@ -70,7 +71,7 @@ impl World {
         ends: &[Pose],
         drives: &[Vec<Option<JointDrive>>],
     ) -> Result<(), StepFailure> {
-        let (whole, mut left, mut is_searched) = (self.params.dt, MAX_PARTS, true);
+        let (whole, mut left, mut has_candidates) = (self.params.dt, MAX_PARTS, true);
         while left > 0 {
             self.params.dt = whole * f64::from(length) / f64::from(MAX_PARTS);
             let share = f64::from(length) / f64::from(left);
@@ -80,15 +81,16 @@ impl World {
             for (moved, ends) in self.articulations.iter_mut().zip(drives) {
                 moved.move_targets(ends, share);
             }
-            if is_searched {
+            if has_candidates {
                 self.shorten_candidates();
             } else {
                 self.count_steps_awake();
                 self.update_collider_motions();
                 self.find_candidates();
             }
-            is_searched = !self.solve()?;
-            if is_searched {
+            // A part that is refused has found its candidates.
+            has_candidates = !self.solve()?;
+            if has_candidates {
                 length /= 2;
                 continue;
             }
@@ -99,8 +101,8 @@ impl World {
         Ok(())
     }
 
-    /// True if the solved motion strains a soft body too far for the present part of the step. The shortest part is
-    /// never too long.
+    /// True if the solved motion strains a soft body too far for the present part of the step; false for the shortest
+    /// part, whatever its motion.
     pub(super) fn strains_too_far(&self) -> bool {
         let is_divisible = self.part_share() > 1.5 / f64::from(MAX_PARTS);
         self.params.average_acceleration
@@ -139,8 +141,8 @@ fn largest_straining(body: &FemState, v: &[Vec3]) -> f64 {
 }
 
 /// Largest way of a node in a part of a step, relative to the rigid motion of its body, m. Linearised, a turn of a
-/// voxel by an angle θ changes its volume by θ², which the larger Lamé parameter resists: the way is less above ν =
-/// 0.3, 0.061 of a voxel at 0.4 and 0.017 at 0.49.
+/// voxel by an angle θ changes its volume by θ², which the Lamé parameter λ resists. So the limit falls above ν = 0.3,
+/// to 0.061 of a voxel at 0.4 and 0.017 at 0.49.
 fn largest_way(model: &FemModel) -> f64 {
     let ratio = model.material.shear_modulus() / model.material.lame_lambda();
     LARGEST_WAY * (1.5 * ratio).sqrt().min(1.0) * model.mesh.edge
