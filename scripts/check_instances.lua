@@ -26,7 +26,6 @@ local opt = softvt.options {
   count = { default = 6, integer = true, min = 1, max = 1000, needs_out = true, help = "instances pressed per asset" },
 }
 
--- Leave out its last sentence when the trials are made again.
 local PAGE = [[
 # Checks of the limits and windows of instances
 
