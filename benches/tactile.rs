@@ -66,7 +66,7 @@ fn main() {
 fn report(case: &Case, gel: &Gel, optics: &PolynomialOptics) {
     let Skin { vertices, triangles } = graph(case.height);
     let skins = [SkinMesh { vertices: &vertices, triangles: &triangles }];
-    let contact = TactileContact { wrench: case.wrench, skins: &skins, friction: 1.5, substrate: None };
+    let contact = TactileContact { wrench: case.wrench, skins: &skins, points: &[], substrate: None };
     let mut scratch = GelScratch::default();
     let field = GelField::solve(gel, &contact, &mut scratch).expect("a good contact").expect("a force");
     let solve = min_ms(|| drop(black_box(GelField::solve(gel, &contact, &mut scratch))));

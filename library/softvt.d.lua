@@ -729,8 +729,6 @@
 
 ---Settings; those that are left out keep their values. docs/settings.md lists all.
 ---@class softvt.Settings.robot.pads
----@field normal_modulus? number Normal stress per indentation. Expects a number in above 0..1000000000000 (Pa/m). Default 300000000.
----@field tangential_modulus? number Shear stress per tangential displacement. Expects a number in above 0..1000000000000 (Pa/m). Default 40000000.
 ---@field static_mu? number Friction coefficient while the pad sticks. Expects a number in 0..100. Default 1.5.
 ---@field dynamic_mu? number Dynamic friction coefficient, not above the static one. Expects a number in 0..100. Default 1.2.
 
@@ -778,7 +776,7 @@
 
 ---Settings; those that are left out keep their values. docs/settings.md lists all.
 ---@class softvt.Settings.tactile.gel
----@field shear_modulus? number Shear modulus. 0.145 MPa: twice the C10 identified on a GelSight Mini (Helmut et al., arXiv 2411.03315). Expects a number in 100..1000000000 (Pa). Default 145000.
+---@field shear_modulus? number Shear modulus. 0.145 MPa: twice the C10 identified on a GelSight Mini (Helmut et al., arXiv 2411.03315). Expects a number in 10000..1000000000 (Pa). Default 145000.
 ---@field poisson? number Poisson's ratio. Expects a number in 0..0.499. Default 0.475.
 ---@field cell? number Edge of a grid cell. Expects a number in 0.0001..0.0005 (m). Default 0.0004.
 
@@ -1667,7 +1665,7 @@ function Markers:rms_residual() end
 ---@return number
 function Markers:outward_shear() end
 
----Returns the trace of the displacement gradient; positive where an indentation pushes the markers outwards.
+---Returns the trace of the displacement gradient; positive where an indentation pushes the markers outwards, negative where a soft flat body draws them together.
 ---@return number
 function Markers:divergence() end
 

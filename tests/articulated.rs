@@ -49,8 +49,7 @@ fn scene() -> Scene {
 
 /// The simulation of the scene, settled.
 fn settled() -> Simulation {
-    let sim =
-        Simulation::new(Arc::new(scene()), &Default::default(), &Default::default(), &AssetCache::default());
+    let sim = Simulation::new(Arc::new(scene()), &Default::default(), &AssetCache::default());
     let mut sim = sim.unwrap_or_else(|e| panic!("{e}"));
     sim.settle().unwrap_or_else(|e| panic!("{e}"));
     sim

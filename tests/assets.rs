@@ -140,8 +140,7 @@ fn soft_assets_have_voxel_meshes_and_closed_samplings() {
 
 /// Bits of the node positions of all soft bodies after settling.
 fn at_rest(scene: Scene, cache: &AssetCache) -> Vec<[u64; 3]> {
-    let mut sim =
-        Simulation::new(Arc::new(scene), &Default::default(), &Default::default(), cache).expect("builds");
+    let mut sim = Simulation::new(Arc::new(scene), &Default::default(), cache).expect("builds");
     sim.settle().unwrap_or_else(|e| panic!("{e}"));
     let bodies = sim.world.soft_bodies().iter();
     bodies.flat_map(|soft| soft.state.x.iter().map(|x| x.map(f64::to_bits).into())).collect()
@@ -182,7 +181,7 @@ fn left_and_right_are_as_in_the_image_and_prompts_name_the_goal() {
         assert!(task.prompt.starts_with(&format!("pick up the {object} ")), "{}", task.prompt);
         assert_eq!(target, "plate");
         let scene = Arc::new(scene(&loaded, task.id, 0));
-        let sim = Simulation::new(scene, &settings.physics, &settings.robot, &cache).expect("it builds");
+        let sim = Simulation::new(scene, &settings, &cache).expect("it builds");
         let mut senses = Sensors::new(&sim, &settings.tactile, &cache);
         let camera = senses.camera("third_person").expect("there").clone();
         let picture = senses.render(&Sensors::frame(&sim), &camera).expect("drawn");
@@ -325,13 +324,8 @@ fn rigid_assets_stay_at_rest_alone_and_stacked() {
     all.extend([["ramekin", "black_bowl"].as_slice(), &["cookies", "black_bowl"], &["plate", "black_bowl"]]);
     for (scene, names) in stacks(&all).into_iter().zip(all) {
         let upright: Vec<f64> = scene.objects.iter().map(|object| object.pose_w.translation.z).collect();
-        let mut sim = Simulation::new(
-            Arc::new(scene),
-            &Default::default(),
-            &Default::default(),
-            &AssetCache::default(),
-        )
-        .expect("builds");
+        let mut sim =
+            Simulation::new(Arc::new(scene), &Default::default(), &AssetCache::default()).expect("builds");
         sim.settle().unwrap_or_else(|e| panic!("{names:?}: {e}"));
         let settled: Vec<Pose> = sim.objects.iter().map(|object| sim.pose(object)).collect();
         for _ in 0..120 {

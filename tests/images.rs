@@ -6,12 +6,12 @@
 use std::{path::PathBuf, sync::Arc};
 
 use softvt::{
-    benchmark::Plan,
+    benchmark::{Plan, settings::Settings},
     disk_cache::DiskCache,
     episode_id::{EpisodeId, EpisodeSplit},
     geometry::{Pose, Quat, Vec3, shape::Shape},
-    physics::{BodyId, PhysicsParams},
-    robot::{RobotSpec, tactile::TactileSpec},
+    physics::BodyId,
+    robot::tactile::TactileSpec,
     rollout::{AssetCache, Sensors, Simulation},
     scene::{Camera, Lighting, Mask, Visual, VisualLayer},
     script,
@@ -53,13 +53,8 @@ fn the_first_task_of_spatial_soft_matches_its_reference() {
     let scene = script::EpisodeSetup::open(&loaded, &id, &script::SceneChanges::default())
         .expect("the suite opens")
         .scene;
-    let sim = Simulation::new(
-        Arc::new(scene),
-        &PhysicsParams::default(),
-        &RobotSpec::default(),
-        &AssetCache::default(),
-    )
-    .expect("the scene builds");
+    let sim = Simulation::new(Arc::new(scene), &Settings::default(), &AssetCache::default())
+        .expect("the scene builds");
     let assets = AssetCache::default();
     let new_sensors = || Sensors::new(&sim, &TactileSpec::default(), &assets);
     let mut sensors = new_sensors();

@@ -1,8 +1,15 @@
-//! Draws the pictures of `docs/images/` and `assets/calibration/` that follow from committed results:
-//! `cargo run --release --example pictures`
+//! Draws the pictures of `docs/images/` and `assets/calibration/` that follow from committed results or from the
+//! library alone: `cargo run --release --example pictures`
 
 mod asset_plots;
 mod calibration;
+#[path = "../../tests/validation/gel.rs"]
+#[allow(dead_code, reason = "shared with the tests")]
+mod gel;
+#[path = "../../tests/validation/pad.rs"]
+#[allow(dead_code, reason = "shared with the tests")]
+mod pad;
+mod partial_slip;
 mod results;
 mod validation;
 
@@ -13,9 +20,10 @@ fn main() -> Result<(), String> {
     write(calibration::IMAGE, &calibration::svg(root)?)?;
     asset_plots::plots(root)?.iter().try_for_each(|(path, plot)| write(path, plot))?;
     write(results::IMAGE, &results::svg(root)?)?;
-    write(validation::IMAGE, &validation::svg(root)?)
+    write(validation::IMAGE, &validation::svg(root)?)?;
+    write(partial_slip::IMAGE, partial_slip::png().map_err(|error| error.to_string())?)
 }
 
-fn write(path: &str, text: &str) -> Result<(), String> {
-    fs::write(path, text).map_err(|error| format!("{path}: {error}"))
+fn write(path: &str, content: impl AsRef<[u8]>) -> Result<(), String> {
+    fs::write(path, content).map_err(|error| format!("{path}: {error}"))
 }

@@ -22,6 +22,8 @@ mod gel;
 mod jointed;
 #[path = "../../tests/validation/light.rs"]
 mod light;
+#[path = "../../tests/validation/pad.rs"]
+mod pad;
 #[path = "../../tests/validation/rigid.rs"]
 mod rigid;
 #[path = "../../tests/validation/rows.rs"]
@@ -70,6 +72,8 @@ const MISSES: &str = "
 
 - With `tactile-servo`, 5.0 and 5.5 % of the verdicts on Spatial-Hidden turn with the step, by Goal Success: it searches for its grip with
   noisy touch, so that another step leads to another search, and in 5 % of the episodes the search takes most of the 25 s of the suite.
+- The tactile sensor shows a wider stick radius than the solver has: its own contact solve makes the contact a little wider, and spreads the
+  shear of the solver's points over 1 mm. A disc of 2 mm covers a few points only, and is 11 % too stiff in a twist.
 - A soft ball rolls slower than a rigid one: it has to lift itself from one voxel to the next, so that it stands still on small slopes.
 - The peak of D of a lifted long body is 3.8 % low at 60 Hz, as a mode is too slow by (ω dt)²/10; at 120 Hz it is within 2 %.
 - A ball of 50 mm with ν = 0.499, 100 kPa and no damping at all becomes invalid in an impact at 2.4 m/s at 60 Hz; with β = 1 ms, a loss
@@ -108,6 +112,7 @@ fn main() {
     rigid_tables::rigid(&mut report);
     rigid_tables::jointed(&mut report);
     senses::gel_under_a_ball(&mut report);
+    senses::pads(&mut report);
     senses::cameras(&mut report);
     report.print();
     print!("{MISSES}");

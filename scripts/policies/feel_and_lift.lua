@@ -6,7 +6,7 @@
 --   softvt suites/object_soft.lua --policy scripts/policies/feel_and_lift.lua --episodes 1
 local MM = 1e-3 / softvt.hand().stroke -- closure per mm of width between the gels
 local DOWN, LOWEST, LIFT = 10, 25, 100 -- mm per control step; height above the base, and lift, mm
-local TOUCHED, COUNT = 4e-4, 8 -- divergence of the markers of a gel that is touched; readings averaged
+local TOUCHED, COUNT = 2e-4, 8 -- divergence of the markers of a gel that is touched; readings averaged
 local CLOSING, SLIDE = 0.1, 15 -- mm per control step until touch; steps of lifting, 0.1 mm each, until the gels slide
 local FINEST, SHARE = 0.02, 0.02 -- tightening per control step: at least this, mm, and this share of the grip
 local SEEN, FOLLOWS, LEAST = 1.3, 1.1, 0.02 -- a grip firmer by SEEN, and shear (px) greater by less than FOLLOWS: it is held
@@ -14,10 +14,11 @@ local HIGHEST = 8 -- largest height of the trial lift, mm
 
 local hand, closure, height, place
 
--- Shear along the fingers of both gels, px, and the smaller divergence.
+-- Shear along the fingers of both gels, px, and the smaller divergence: that of a hard or round body pushes the markers
+-- apart, that of a soft flat one draws them together.
 local function read(fingers)
   local left, right = fingers.left.markers, fingers.right.markers
-  return -0.5 * (left:mean()[1] + right:mean()[1]), math.min(left:divergence(), right:divergence())
+  return -0.5 * (left:mean()[1] + right:mean()[1]), math.min(math.abs(left:divergence()), math.abs(right:divergence()))
 end
 
 -- Moves by `closing` and `rising` mm in one control step. Returns the shear and the divergence after it.

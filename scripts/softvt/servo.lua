@@ -40,7 +40,7 @@ local MARGIN, FIRMER, MOST_FAILURES = 1.25, 1.15, 2
 -- closing to the grip, mm per control step.
 local LANDING, LOOSENED, DOWN, CLOSING = 0.3, 0.3, 0.2, 0.15
 
--- Mean motion of the markers of both fingers towards the fingertips, px, and the divergence of each: its load.
+-- Mean motion of the markers of both fingers towards the fingertips, px, and the divergence of each.
 local function read(fingers)
   local left, right = fingers.left.markers, fingers.right.markers
   return -0.5 * (left:mean()[1] + right:mean()[1]), left:divergence(), right:divergence()
@@ -54,6 +54,10 @@ local function recent(list, count)
   end
   return sum / (#list - first + 1)
 end
+
+-- Load of a gel by its last divergences. A hard or round body pushes the markers apart, a soft flat one draws them
+-- together.
+local function load_of(divergences) return math.abs(recent(divergences, WINDOW)) end
 
 local Trial = {}
 Trial.__index = Trial
@@ -75,7 +79,7 @@ function Trial:approach()
     local shifting = left == right and 0 or 0.5 * APPROACH * (left and 1 or -1)
     local is_far = self.closure - start > FAR * MM and not (left or right)
     self:move(is_far and FAR_APPROACH or APPROACH, 0, shifting)
-    left, right = recent(self.left, WINDOW) > TOUCHED, recent(self.right, WINDOW) > TOUCHED
+    left, right = load_of(self.left) > TOUCHED, load_of(self.right) > TOUCHED
   end
   self.touch = self.closure - LATE * MM
   for _ = 1, 4 do
@@ -145,7 +149,7 @@ function Trial:tighten(margin)
     local shear, grip = max(0, recent(self.shear, WINDOW)), (self.closure - self.touch) / MM
     local closing = max(FINEST, max(SLOW, min(FAST, FAST * shear / STRONG)) * grip)
     local rising = max(LEAST_RISE, min(MOST_RISE, SURE * shear / grip / STIFFNESS)) * closing
-    local left, right = recent(self.left, WINDOW), recent(self.right, WINDOW)
+    local left, right = load_of(self.left), load_of(self.right)
     self:move(closing, rising, 0.5 * closing * max(-1, min(1, (left - right) / max(TOUCHED, left + right))))
     local found = self:bend(first)
     if found then

@@ -9,11 +9,16 @@
 //! (Helmut et al., Learning Force Distribution Estimation for the GelSight Mini Optical Tactile Sensor Based on
 //! Finite Element Analysis, arXiv 2411.03315).
 
+use std::sync::Arc;
+
 use nalgebra::Quaternion;
 
-use super::spec::Side;
+use super::{spec::Side, tactile::GelSpec};
 use softvt_geometry::{Aabb, Mat3, Pose, Quat, Vec3, shape::SampleContact};
-use softvt_physics::contact::{CollisionGeometry, ContactSurface, GelSample};
+use softvt_physics::{
+    contact::{Collider, CollisionGeometry, ContactSurface, ElasticLayer, Friction, GelSample},
+    ids::BodyId,
+};
 
 /// Height of the gel's apex above the finger frame, m; equal to that of Franka's own finger tips.
 pub(super) const APEX_Z: f64 = 0.045;
@@ -102,6 +107,26 @@ impl PadSurface {
             })
             .filter(|sample| sample.area > 0.0)
             .collect()
+    }
+}
+
+impl PadSurface {
+    /// A collider of this pad on a body, at the pad's pose in its frame.
+    pub fn collider(
+        self,
+        name: &str,
+        parent: BodyId,
+        pose_in_parent: Pose,
+        friction: Friction,
+        layer: &Arc<ElasticLayer>,
+    ) -> Collider {
+        Collider::new(name, parent, pose_in_parent, Arc::new(self), friction, layer.untouched())
+            .with_layer(layer.clone())
+    }
+
+    /// The gel of this pad as an elastic layer.
+    pub fn layer(&self, gel: &GelSpec) -> Arc<ElasticLayer> {
+        Arc::new(ElasticLayer::new(&gel.layer(self), self.length, self.width))
     }
 }
 

@@ -93,13 +93,8 @@ softvt_common::settings! {
 }
 
 softvt_common::settings! {
-    /// Contact of the gel pads: friction, and the compliance of gel and sensor per contact area (a model of the 4 mm
-    /// gel for wide patches). It determines force and slip; tactile images are computed from a model of their own.
+    /// Friction of the gel pads. Their elasticity is that of `tactile.gel`.
     pub struct PadSpec {
-        /// Normal stress per indentation.
-        normal_modulus: f64 = 3e8, "Pa/m", Range::above(0.0, 1e12);
-        /// Shear stress per tangential displacement.
-        tangential_modulus: f64 = 4e7, "Pa/m", Range::above(0.0, 1e12);
         /// Friction coefficient while the pad sticks.
         static_mu: f64 = 1.5, "", Range::closed(0.0, 100.0);
         /// Dynamic friction coefficient, not above the static one.

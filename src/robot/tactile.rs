@@ -10,6 +10,7 @@ use softvt_common::{
     settings::{SettingDeclaration, SettingField, SettingValue, SettingVisitor},
 };
 use softvt_geometry::Vec3;
+use softvt_physics::contact::LayerMaterial;
 
 /// Width and height of a tactile image, px.
 pub const IMAGE_SIZE: [usize; 2] = [320, 240];
@@ -50,11 +51,12 @@ softvt_common::settings! {
 }
 
 softvt_common::settings! {
-    /// Material and grid of the gel. Its shape is [`PadSurface`].
+    /// Material of the gel, for the contact of the pads and for the images, and grid of the images. Its shape is
+    /// [`PadSurface`].
     #[derive(Copy)]
     pub struct GelSpec {
         /// Shear modulus. 0.145 MPa: twice the C10 identified on a GelSight Mini (Helmut et al., arXiv 2411.03315).
-        shear_modulus: f64 = 1.45e5, "Pa", Range::closed(1e2, 1e9);
+        shear_modulus: f64 = 1.45e5, "Pa", Range::closed(1e4, 1e9);
         /// Poisson's ratio.
         poisson: f64 = 0.475, "", Range::closed(0.0, 0.499);
         /// Edge of a grid cell.
@@ -71,6 +73,13 @@ softvt_common::settings! {
         pitch: f64 = 6.34e-5, "m", Range::closed(1e-5, 2e-4);
         /// Distance of the pinhole from the apex.
         lens: f64 = 2.6e-2, "m", Range::closed(5e-3, 1.0);
+    }
+}
+
+impl GelSpec {
+    /// The gel of a pad as an elastic layer.
+    pub fn layer(&self, pad: &PadSurface) -> LayerMaterial {
+        LayerMaterial { shear_modulus: self.shear_modulus, poisson: self.poisson, thickness: pad.thickness }
     }
 }
 

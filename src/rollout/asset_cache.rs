@@ -146,6 +146,7 @@ impl DerivedShape {
             surface: self.clone(),
             friction,
             stiffness: world.rigid_surface_stiffness(),
+            layer: None,
             bounds: self.bounds(),
             base_of: None,
             collision_geometry: Some(self.solid()),

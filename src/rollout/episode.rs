@@ -191,8 +191,7 @@ impl Episode {
     pub fn start(spec: EpisodeSpec, cache: &AssetCache) -> Result<Self, EpisodeError> {
         check_sensors(&spec.scene, &spec.settings.tactile, cache)
             .map_err(|source| spec.sense_error(source))?;
-        let mut sim =
-            Simulation::new(spec.scene.clone(), &spec.settings.physics, &spec.settings.robot, cache)?;
+        let mut sim = Simulation::new(spec.scene.clone(), &spec.settings, cache)?;
         let goal = GoalInScene::find(&spec.task, &sim, cache, &spec.predicates)?;
         let target = goal.targets[0];
         sim.settle().map_err(|source| EpisodeError::Settle {

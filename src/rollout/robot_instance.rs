@@ -6,7 +6,7 @@ use super::sensor_noise::SensorSeed;
 use softvt_geometry::{Pose, Vec3, shape::Shape};
 use softvt_physics::{
     ArticulationId, ColliderId, LinkId, World,
-    contact::{Collider, Friction, SurfaceStiffness},
+    contact::{ElasticLayer, Friction},
     world::JointDrive,
 };
 use softvt_policy::RobotState;
@@ -17,6 +17,7 @@ use softvt_robot::{
     pads::{self, PadSurface},
     panda::{self, ARM_DOFS},
     rotation,
+    tactile::GelSpec,
 };
 
 /// The robot of a simulation: an articulation with position drives, which follows commands of the tool pose
@@ -70,6 +71,7 @@ impl RobotInstance {
     pub fn new(
         world: &mut World,
         spec: &RobotSpec,
+        gel: &GelSpec,
         base_w: &Pose,
         q: &[f64; ARM_DOFS],
         control_dt: f64,
@@ -92,7 +94,8 @@ impl RobotInstance {
             })
             .collect();
         let articulation = world.add_articulation("panda", tree, &all, drives, false);
-        let pads = Side::BOTH.map(|side| add_pad(world, spec, articulation, side));
+        let layer = PadSurface::default().layer(gel);
+        let pads = Side::BOTH.map(|side| add_pad(world, spec, &layer, articulation, side));
         let mut body = Vec::new();
         for side in Side::BOTH {
             let link = panda::finger_link(side);
@@ -226,20 +229,22 @@ impl RobotInstance {
     }
 }
 
-fn add_pad(world: &mut World, spec: &RobotSpec, articulation: ArticulationId, side: Side) -> ColliderId {
+fn add_pad(
+    world: &mut World,
+    spec: &RobotSpec,
+    layer: &Arc<ElasticLayer>,
+    articulation: ArticulationId,
+    side: Side,
+) -> ColliderId {
     let link = LinkId { articulation, index: panda::finger_link(side) };
     let friction = Friction::new(spec.pads.static_mu, spec.pads.dynamic_mu);
-    let stiffness =
-        SurfaceStiffness { normal: spec.pads.normal_modulus, shear: spec.pads.tangential_modulus };
     let name = if side == Side::Left { "left pad" } else { "right pad" };
-    let surface = Arc::new(PadSurface::default());
-    world.add_collider(Collider::new(
+    world.add_collider(PadSurface::default().collider(
         name,
-        link,
+        link.into(),
         pads::pad_pose_in_finger(side),
-        surface,
         friction,
-        stiffness,
+        layer,
     ))
 }
 

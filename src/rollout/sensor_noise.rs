@@ -96,7 +96,7 @@ mod tests {
     fn worn(spec: WearSpec, seed: i64, side: Side, step: u64) -> TactileReading {
         let sensor = TactileSensor::new(&TactileSpec::default()).expect("a sensor");
         let contact =
-            TactileContact { wrench: PadWrench::default(), skins: &[], friction: 1.0, substrate: None };
+            TactileContact { wrench: PadWrench::default(), skins: &[], points: &[], substrate: None };
         let mut reading = sensor.read(&contact, &mut GelScratch::default()).expect("a reading");
         for (marker, current) in reading.markers.current.iter_mut().enumerate() {
             current[0] += marker as f32;

@@ -11,18 +11,17 @@ use super::{
     robot_instance::RobotInstance,
     settled_box::{SettledBox, lean},
 };
-use softvt_benchmark::CONTROL_DT;
+use softvt_benchmark::{CONTROL_DT, settings::Settings};
 use softvt_common::{cancel, text::hex};
 use softvt_evaluation::deformation::ReferenceShape;
 use softvt_geometry::{Aabb, Pose, Vec3};
 use softvt_physics::{
-    BodyId, ColliderId, ContactPartner, PhysicsParams, World,
+    BodyId, ColliderId, ContactPartner, World,
     contact::Friction,
     fem::FemModel,
     joints,
     world::{ContactPatch, ContactSummary, StepFailure},
 };
-use softvt_robot::RobotSpec;
 use softvt_scene::{Asset, Body, Joint, Scene};
 
 /// Speed below which an object counts as settled, m/s.
@@ -128,15 +127,17 @@ impl Simulation {
     ///
     /// # Errors
     /// An object cannot be built, two objects have one name, or objects overlap each other or the robot.
-    pub fn new(
-        scene: Arc<Scene>,
-        params: &PhysicsParams,
-        robot_spec: &RobotSpec,
-        cache: &AssetCache,
-    ) -> Result<Self, SceneBuildError> {
-        let mut world = World::new(params.clone(), scene.gravity);
+    pub fn new(scene: Arc<Scene>, settings: &Settings, cache: &AssetCache) -> Result<Self, SceneBuildError> {
+        let mut world = World::new(settings.physics.clone(), scene.gravity);
         let objects = build::add_all(&mut world, &scene, cache)?;
-        let robot = RobotInstance::new(&mut world, robot_spec, &scene.base_w, &scene.start_q, CONTROL_DT);
+        let robot = RobotInstance::new(
+            &mut world,
+            &settings.robot,
+            &settings.tactile.gel,
+            &scene.base_w,
+            &scene.start_q,
+            CONTROL_DT,
+        );
         build::check_overlap(&mut world, &scene)?;
         build::check_base(&scene)?;
         Ok(Self { scene, world, robot, objects })

@@ -170,8 +170,7 @@ fn draw(loaded: &LoadedScript) -> Result<Vec<GrowthPoint>, RunError> {
     let settings = &suite.settings;
     let scene = Arc::new(opened.scene);
     let assets = AssetCache::default();
-    let mut sim =
-        Simulation::new(scene, &settings.physics, &settings.robot, &assets).map_err(RunError::input)?;
+    let mut sim = Simulation::new(scene, settings, &assets).map_err(RunError::input)?;
     sim.settle().map_err(RunError::input)?;
     let mut sensors = Sensors::new(&sim, &settings.tactile, &assets);
     let (frame, camera) =

@@ -481,7 +481,7 @@ impl<'a> SuiteRun<'a> {
         let sense = |source| EpisodeError::Sense { task: task.id, episode, source };
         let check = || -> Result<Vec<String>, EpisodeError> {
             check_sensors(&scene, &settings.tactile, &self.assets).map_err(sense)?;
-            let sim = Simulation::new(scene.clone(), &settings.physics, &settings.robot, &self.assets)?;
+            let sim = Simulation::new(scene.clone(), settings, &self.assets)?;
             sim.check_support()?;
             let goal = check_goal(task, &sim, &self.assets, &predicates)?;
             if goal.may_hold {
@@ -510,9 +510,8 @@ impl<'a> SuiteRun<'a> {
         EpisodeJob { task, episode }: EpisodeJob,
         scene: &Scene,
     ) -> Result<Vec<String>, RunError> {
-        let Settings { physics, robot, .. } = &self.settings;
         let settle = || -> Result<Simulation, EpisodeError> {
-            let mut sim = Simulation::new(Arc::new(scene.clone()), physics, robot, &self.assets)?;
+            let mut sim = Simulation::new(Arc::new(scene.clone()), &self.settings, &self.assets)?;
             let layout = task.layout.clone();
             sim.settle().map_err(|source| EpisodeError::Settle { layout, episode, source })?;
             Ok(sim)
@@ -573,7 +572,7 @@ impl<'a> SuiteRun<'a> {
         if streams.cameras.is_empty() && !streams.tactile {
             return Ok(());
         }
-        let sim = Simulation::new(scene, &settings.physics, &settings.robot, &self.assets)?;
+        let sim = Simulation::new(scene, settings, &self.assets)?;
         let mut sensors = Sensors::new(&sim, &settings.tactile, &self.assets);
         sensors.compute_once(&Sensors::frame(&sim), &streams).map_err(sense)
     }

@@ -57,8 +57,7 @@ fn of_run(
         let index = record.header.id.index();
         let Some(task) = suite.tasks.iter().find(|task| task.id == index.task) else { continue };
         let scene = Arc::new(scenes.open_episode(&scenes.episode_id(task, index.episode))?.scene);
-        let (physics, robot) = (&scenes.settings.physics, &scenes.settings.robot);
-        let sim = Simulation::new(scene, physics, robot, &scenes.assets).map_err(RunError::input)?;
+        let sim = Simulation::new(scene, &scenes.settings, &scenes.assets).map_err(RunError::input)?;
         let Some(target) = sim.objects.iter().position(|object| object.name == task.object) else { continue };
         let mut sensors = Sensors::new(&sim, &scenes.settings.tactile, &scenes.assets);
         let picture = sensors.portrait(&Sensors::frame(&sim), target, EDGE).map_err(RunError::input)?;

@@ -1,20 +1,12 @@
 //! Gel pads against rigid bodies.
 
-use std::sync::Arc;
-
 use softvt::{
     geometry::{Pose, Vec3, shape::Shape},
-    physics::{
-        BodyId, ColliderId, ContactPartner, KinematicId, RigidId, World,
-        contact::{Collider, Friction, SurfaceStiffness},
-    },
-    robot::{Side, pads::PadSurface},
-    sensing::tactile::patch_friction,
+    physics::{BodyId, ColliderId, ContactPartner, KinematicId, RigidId, World, contact::Friction},
+    robot::{Side, pads::PadSurface, tactile::GelSpec},
 };
 
 use crate::scene::*;
-
-const GEL: SurfaceStiffness = SurfaceStiffness { normal: 3e8, shear: 4e7 };
 
 /// Two prescribed pads whose apexes are `apart` (m) from each other along y, at height z.
 struct Hand {
@@ -33,13 +25,14 @@ impl Hand {
     fn new(world: &mut World, apart: f64, lift: f64) -> Self {
         let frames = Side::BOTH.map(|side| world.add_kinematic(pad_pose(side, apart, lift)));
         let pads = frames.map(|frame| {
-            world.add_collider(Collider::new(
+            let pad = PadSurface::default();
+            let layer = pad.layer(&GelSpec::default());
+            world.add_collider(pad.collider(
                 "pad",
-                frame,
+                frame.into(),
                 Pose::identity(),
-                Arc::new(PadSurface::default()),
                 friction(1.5, 1.2),
-                GEL,
+                &layer,
             ))
         });
         Self { frames, pads }
@@ -91,15 +84,31 @@ fn grasped_of(
 }
 
 #[test]
-fn a_flat_face_on_the_dome_is_carried_by_a_bed_of_springs() {
-    // F = k π sqrt(Rx Ry) d² for a paraboloid pressed d deep, while the patch is inside of the footprint.
-    let (pad, hard) = (PadSurface::default(), 1e9);
-    let k = 1.0 / (1.0 / GEL.normal + 1.0 / hard);
-    for depth in [5e-5, 1e-4, 2e-4] {
-        let (world, body, hand, _) = grasped(&cuboid(0.04, 0.05, 0.04), at(0.0, 0.0, 0.02), 0.05, depth);
-        let expected = k * std::f64::consts::PI * (pad.radius_x * pad.radius_y).sqrt() * depth * depth;
-        for force in hand.force(&world, body) {
-            assert!((force / expected - 1.0).abs() < 0.05, "{force} instead of {expected} N at {depth} m");
+fn round_and_bumpy_bodies_are_held_at_rest() {
+    // Their normals are tilted against those of the pads, and a bump presses more than what is around it.
+    let ball = |radius: f64, y: f64| Shape::Sphere { radius }.translated(Vec3::new(0.004, y, 0.004));
+    let bumpy = Shape::Union(vec![cuboid(0.03, 0.03, 0.03), ball(1.5e-3, 0.014), ball(1.5e-3, -0.014)]);
+    for (name, shape, width, depth) in [
+        ("small ball", Shape::Sphere { radius: 0.01 }, 0.02, 8e-4),
+        ("ball", Shape::Sphere { radius: 0.02 }, 0.04, 5e-4),
+        ("bumps", bumpy, 0.031, 6e-4),
+    ] {
+        for rate in [60.0, 240.0] {
+            let mut world = world();
+            world.params.dt = 1.0 / rate;
+            world.gravity = Vec3::zeros();
+            let body = rigid(&mut world, &shape, 0.05, Pose::identity(), friction(0.6, 0.5));
+            let hand = Hand::new(&mut world, width + 0.002, 0.0);
+            hand.go(&mut world, (width + 0.002, 0.0), (width - 2.0 * depth, 0.0), 0.5);
+            world.gravity = Vec3::new(0.0, 0.0, -GRAVITY);
+            run(&mut world, 1.0);
+            let before = world.rigid(body).state.pose_w;
+            run(&mut world, 2.0);
+            let (now, v) = (world.rigid(body).state.pose_w, world.rigid(body).state.v.norm());
+            let crept = (now.translation.vector - before.translation.vector).norm();
+            let force = hand.force(&world, body);
+            assert!(force[0] > 0.5 && force[1] > 0.5, "{name}, {rate} Hz: held with {force:?} N");
+            assert!(crept < 1e-5 && v < 2e-4, "{name}, {rate} Hz: crept {crept} m, moves at {v} m/s");
         }
     }
 }
@@ -143,7 +152,7 @@ fn a_patch_has_the_friction_of_its_pair_held_and_sliding() {
     {
         let of = friction(surface.0, surface.1);
         let (mut world, _, hand, shut) = grasped_of(&shape, at(0.0, 0.0, 0.02), 0.05, 1.5e-5, of);
-        let mu = |world: &World| patch_friction(&world.patch(hand.pads[0])).expect("a force");
+        let mu = |world: &World| world.patch(hand.pads[0]).points[0].mu;
         assert!((mu(&world) - held).abs() < 1e-12, "{surface:?}: held with {}", mu(&world));
         // Too weak a grip to lift the body: the pads slide up on it, at 60 mm/s.
         for step in 1..=10 {
@@ -165,8 +174,9 @@ fn the_load_of_a_box_that_covers_part_of_a_pad_changes_without_jumps_as_it_moves
     };
     let forces: Vec<f64> = (0..8).map(|i| force(1e-4 * f64::from(i))).collect();
     eprintln!("{forces:?}");
-    for pair in forces.windows(2) {
-        assert!((pair[1] / pair[0] - 1.0).abs() < 0.03, "{forces:?}");
+    let changes: Vec<f64> = forces.windows(2).map(|pair| pair[1] - pair[0]).collect();
+    for pair in changes.windows(2) {
+        assert!((pair[1] / pair[0] - 1.0).abs() < 0.1, "{forces:?}");
     }
 }
 

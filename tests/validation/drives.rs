@@ -3,7 +3,7 @@
 use softvt::{
     geometry::{Pose, Vec3},
     physics::{PhysicsParams, World},
-    robot::{RobotSpec, gripper::GripTarget},
+    robot::{RobotSpec, gripper::GripTarget, tactile::GelSpec},
     rollout::{ArmCommand, RobotInstance},
 };
 
@@ -32,7 +32,14 @@ pub fn hand_acceleration(rate: f64) -> f64 {
     let params = PhysicsParams { dt: 1.0 / rate, ..PhysicsParams::default() };
     let mut world = World::new(params, GRAVITY * Vec3::new(0.0, 0.0, -1.0));
     let spec = RobotSpec::default();
-    let mut robot = RobotInstance::new(&mut world, &spec, &Pose::identity(), &START, 1.0 / CONTROL_RATE);
+    let mut robot = RobotInstance::new(
+        &mut world,
+        &spec,
+        &GelSpec::default(),
+        &Pose::identity(),
+        &START,
+        1.0 / CONTROL_RATE,
+    );
     let start_b = robot.tool_b(&world);
     let mut path = Vec::new();
     for command in 1..=((LIFT.1 + 0.5) * CONTROL_RATE).round() as usize {

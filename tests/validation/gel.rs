@@ -41,30 +41,52 @@ pub fn depth_bound(depth: f64) -> f64 {
     if depth < 2e-4 { 0.05 } else { 0.10 }
 }
 
+/// A pad with a flat surface.
+pub const FLAT: PadSurface = PadSurface {
+    length: 25.25e-3,
+    width: 20.75e-3,
+    corner: 1.5e-3,
+    thickness: 4e-3,
+    radius_x: 1e6,
+    radius_y: 1e6,
+};
+
 /// A gel with a flat surface on the default grid.
 pub fn flat_gel() -> Gel {
-    let flat = PadSurface { radius_x: 1e6, radius_y: 1e6, ..PadSurface::default() };
-    Gel::new(&TactileSpec::default(), flat).expect("default numbers")
+    Gel::new(&TactileSpec::default(), FLAT).expect("default numbers")
+}
+
+/// Surface of a rigid body in the frame of the pad.
+pub struct Skin {
+    pub vertices: Vec<Vec3>,
+    pub triangles: Vec<[u32; 3]>,
+}
+
+impl Skin {
+    /// The surface of this height (m) over a square of 24 mm.
+    pub fn graph(height: impl Fn(f64, f64) -> f64) -> Self {
+        let (n, half) = (240_u32, 12e-3);
+        let along = |i: u32| -half + 2.0 * half * f64::from(i) / f64::from(n);
+        let points = (0..=n).flat_map(|j| (0..=n).map(move |i| (along(i), along(j))));
+        let corner = |i: u32, j: u32| j * (n + 1) + i;
+        let triangles = (0..n * n).flat_map(|c| {
+            let (i, j) = (c % n, c / n);
+            let [a, b, c, d] = [corner(i, j), corner(i + 1, j), corner(i + 1, j + 1), corner(i, j + 1)];
+            [[a, c, b], [a, d, c]]
+        });
+        Self {
+            vertices: points.map(|(x, y)| Vec3::new(x, y, height(x, y))).collect(),
+            triangles: triangles.collect(),
+        }
+    }
 }
 
 /// The ball pressed by `force` (N) at a place.
 pub fn press(gel: &Gel, at: [f64; 2], force: f64) -> GelField {
-    let (n, half) = (240_u32, 12e-3);
-    let along = |i: u32| -half + 2.0 * half * f64::from(i) / f64::from(n);
-    let height = |x: f64, y: f64| ((x - at[0]).powi(2) + (y - at[1]).powi(2)) / (2.0 * BALL);
-    let points = (0..=n).flat_map(|j| (0..=n).map(move |i| (along(i), along(j))));
-    let vertices: Vec<Vec3> = points.map(|(x, y)| Vec3::new(x, y, height(x, y))).collect();
-    let corner = |i: u32, j: u32| j * (n + 1) + i;
-    let triangles: Vec<[u32; 3]> = (0..n * n)
-        .flat_map(|c| {
-            let (i, j) = (c % n, c / n);
-            let [a, b, c, d] = [corner(i, j), corner(i + 1, j), corner(i + 1, j + 1), corner(i, j + 1)];
-            [[a, c, b], [a, d, c]]
-        })
-        .collect();
-    let skins = [SkinMesh { vertices: &vertices, triangles: &triangles }];
+    let skin = Skin::graph(|x, y| ((x - at[0]).powi(2) + (y - at[1]).powi(2)) / (2.0 * BALL));
+    let skins = [SkinMesh { vertices: &skin.vertices, triangles: &skin.triangles }];
     let wrench = PadWrench::new(force, [0.0; 2], 0.0, [0.0; 2]);
-    let contact = TactileContact { wrench, skins: &skins, friction: 1.5, substrate: None };
+    let contact = TactileContact { wrench, points: &[], skins: &skins, substrate: None };
     GelField::solve(gel, &contact, &mut GelScratch::default()).expect("a good contact").expect("a force")
 }
 

@@ -15,6 +15,7 @@ mod friction;
 mod gel;
 mod jointed;
 mod light;
+mod pad;
 mod rigid;
 mod rows;
 #[path = "../physics_contact/solids.rs"]

@@ -4,7 +4,7 @@ use std::{fmt::Debug, sync::Arc};
 
 use serde::{Deserialize, Serialize};
 
-use super::solid::CollisionGeometry;
+use super::{layer::ElasticLayer, solid::CollisionGeometry};
 use crate::ids::{ArticulationId, BodyId};
 use softvt_common::range::Range;
 use softvt_geometry::{
@@ -107,7 +107,8 @@ impl Friction {
     }
 }
 
-/// Stiffness of a surface per area, Pa/m: contact is a bed of springs in both directions.
+/// Stiffness of a surface per area, Pa/m: contact is a bed of springs in both directions. Those of an elastic layer
+/// have rest positions that move.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SurfaceStiffness {
     /// In the normal direction.
@@ -117,6 +118,12 @@ pub struct SurfaceStiffness {
 }
 
 impl SurfaceStiffness {
+    /// Displacement of springs along a unit normal and across it by a traction (Pa), m.
+    pub(crate) fn compliance(&self, traction: &Vec3, normal: &Vec3) -> Vec3 {
+        let pressed = normal * normal.dot(traction);
+        pressed / self.normal + (traction - pressed) / self.shear
+    }
+
     /// Two surfaces pressed on each other: springs in series.
     pub fn in_series(&self, other: &Self) -> Self {
         let series = |a: f64, b: f64| 1.0 / (1.0 / a + 1.0 / b);
@@ -137,8 +144,10 @@ pub struct Collider {
     pub surface: Arc<dyn ContactSurface>,
     /// Friction of the surface.
     pub friction: Friction,
-    /// Stiffness of the surface.
+    /// Stiffness of the surface, where it has no layer.
     pub stiffness: SurfaceStiffness,
+    /// The elastic layer that the surface is, in the collider's frame.
+    pub layer: Option<Arc<ElasticLayer>>,
     /// Bounds in the collider's frame.
     pub bounds: Aabb,
     /// The articulation whose fixed base this is, such as the corpus of a chest of drawers. It never
@@ -167,10 +176,18 @@ impl Collider {
             surface,
             friction,
             stiffness,
+            layer: None,
             bounds,
             base_of: None,
             collision_geometry,
         }
+    }
+
+    /// The same collider, of an elastic layer.
+    #[must_use]
+    pub fn with_layer(mut self, layer: Arc<ElasticLayer>) -> Self {
+        self.layer = Some(layer);
+        self
     }
 
     /// The same collider as the fixed base of `articulation`.

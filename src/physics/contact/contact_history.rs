@@ -14,6 +14,8 @@ pub(crate) struct ContactRecord {
     pub(crate) anchor: Vec3,
     /// Normal impulse of the last step, N s.
     pub(crate) normal_impulse: f64,
+    /// Tangential impulse of the last step in the partner's frame, N s.
+    pub(crate) shear_impulse: Vec3,
     /// True while the pair of surfaces slides, so that dynamic friction acts.
     pub(crate) is_sliding: bool,
     /// Distance by which the anchor was dragged since first contact, m.
@@ -26,6 +28,7 @@ impl ContactRecord {
         step: 0,
         anchor: Vec3::new(0.0, 0.0, 0.0),
         normal_impulse: 0.0,
+        shear_impulse: Vec3::new(0.0, 0.0, 0.0),
         is_sliding: false,
         slip_distance: 0.0,
     };

@@ -7,6 +7,7 @@
 mod collider;
 mod contact_history;
 mod detect;
+mod layer;
 mod manifold;
 mod soft_field;
 mod solid;
@@ -14,6 +15,8 @@ mod solid;
 pub use collider::{Collider, ContactSurface, Friction, SurfaceStiffness};
 pub(crate) use contact_history::{ContactHistory, ContactRecord};
 pub(crate) use detect::{BodyBounds, ColliderMotion, ContactCandidate, DetectionLimits, detect};
+pub(crate) use layer::LayerState;
+pub use layer::{ElasticLayer, LayerMaterial, LayerResponse};
 pub(crate) use manifold::ManifoldPoint;
 pub use manifold::SurfaceFeatures;
 pub(crate) use soft_field::{DeformedSdf, SdfCandidate, detect_soft, may_touch};

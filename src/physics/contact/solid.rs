@@ -170,9 +170,8 @@ impl RigidShape {
 
     /// Contact points of a compliant skin at `gel_pose` with this shape whose gap is below `margin` (m).
     ///
-    /// A bed of springs, one at each sample, compressed by the depth of the sample in the shape (a Winkler
-    /// foundation: Johnson, Contact Mechanics, 1985, 4.3). A sample at a sharp edge of the shape counts with its
-    /// covered share. Normals point from the skin to the shape.
+    /// A point at each sample, compressed by the depth of the sample in the shape. A sample at a sharp edge of the
+    /// shape counts with its covered share. Normals point from the skin to the shape.
     fn gel_contacts(
         &self,
         pose: &Pose,

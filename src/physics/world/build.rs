@@ -7,7 +7,7 @@ use super::{
     state::{JointFriction, SleepState},
 };
 use crate::{
-    contact::{Collider, ContactHistory, ContactSurface, Friction, SurfaceStiffness},
+    contact::{Collider, ContactHistory, ContactSurface, Friction, LayerState, SurfaceStiffness},
     fem::{FemModel, FemState, system::VelocitySystem},
     ids::{ArticulationId, BodyId, ColliderId, KinematicId, RigidId, SoftId},
     joints::{self, JointState, JointTree},
@@ -118,6 +118,7 @@ impl World {
         let can_carry = self.has_solid(collider.parent);
         assert!(can_carry, "collider {}: {:?} cannot carry it", collider.name, collider.parent);
         self.wake_all();
+        self.layers.push(collider.layer.as_deref().map(LayerState::new));
         self.colliders.push(collider);
         ColliderId::new(self.colliders.len() - 1)
     }

@@ -1,8 +1,10 @@
 //! Conversion of a contact between two surfaces, of whatever bodies, to a contact point of the solver, and the
-//! evolution of its tangential spring.
+//! evolution of its tangential spring and of the elastic layers.
 
+use super::{World, snapshot::ColliderPoint};
 use crate::{
-    contact::{Friction, SurfaceStiffness},
+    contact::{Friction, LayerState, SurfaceStiffness},
+    ids::{ColliderId, ContactPartner},
     solver::ContactPoint,
 };
 use softvt_geometry::Vec3;
@@ -19,6 +21,9 @@ pub(super) struct SurfaceContact {
     pub area: f64,
     /// Stretch of the tangential spring, m, world; its part along the normal is ignored.
     pub stretch: Vec3,
+    /// Motion of the rest position of the springs, m, world: of the surface that the normal points away from, less of
+    /// the other.
+    pub rest: Vec3,
     /// Normal impulse of the last step if it had been as long as this one, N s.
     pub previous_normal_impulse: f64,
     /// True if the two surfaces slide on each other.
@@ -28,13 +33,14 @@ pub(super) struct SurfaceContact {
 impl SurfaceContact {
     /// The solver's point for this contact, without node weights and drift velocity.
     pub(super) fn contact_point(&self, friction: &Friction, stiffness: &SurfaceStiffness) -> ContactPoint {
+        let stretch = self.stretch - self.rest;
         ContactPoint {
             p: self.p,
             normal: self.normal,
             stiffness: stiffness.normal * self.area,
             shear_stiffness: stiffness.shear * self.area,
-            gap: self.gap,
-            offset: self.stretch - self.normal * self.normal.dot(&self.stretch),
+            gap: self.gap - self.normal.dot(&self.rest),
+            offset: stretch - self.normal * self.normal.dot(&stretch),
             mu: if self.is_sliding { friction.dynamic_mu } else { friction.static_mu },
             previous_normal_impulse: self.previous_normal_impulse,
             ..ContactPoint::default()
@@ -60,6 +66,72 @@ impl SpringUpdate {
         let allowed =
             point.mu * point.previous_normal_impulse / (dt * point.shear_stiffness).max(f64::MIN_POSITIVE);
         Self { stretch, slipped: (stretch.norm() - allowed).max(0.0) }
+    }
+}
+
+impl World {
+    /// Stiffness of a collider at a contact with this normal (world) that had a traction on the collider in the last
+    /// step (Pa, world), and the motion of the rest position of its springs, m, world.
+    pub(super) fn surface_at(
+        &self,
+        id: ColliderId,
+        p_w: &Vec3,
+        normal: &Vec3,
+        traction: &Vec3,
+    ) -> (SurfaceStiffness, Vec3) {
+        let collider = self.collider(id);
+        let (Some(layer), Some(state)) = (&collider.layer, &self.layers[id.index()]) else {
+            return (collider.stiffness, Vec3::zeros());
+        };
+        let pose = &self.motions[id.index()].pose;
+        let p_p = pose.inverse_transform_point(&(*p_w).into()).coords;
+        let traction_p = pose.rotation.inverse_transform_vector(traction);
+        let moved = pose.rotation * state.moved_at(layer, &p_p, &traction_p);
+        let stiffness = state.stiffness_at(layer, &p_p);
+        (stiffness, moved - stiffness.compliance(traction, normal))
+    }
+
+    /// Loads the elastic layers with the solved points, and finds how they answer.
+    pub(super) fn update_layers(&mut self) {
+        let mut layers = std::mem::take(&mut self.layers);
+        layers.iter_mut().flatten().for_each(LayerState::clear);
+        let mut load = |id: ColliderId, point: &ContactPoint, sign: f64| {
+            let (Some(layer), Some(state)) = (&self.collider(id).layer, &mut layers[id.index()]) else {
+                return;
+            };
+            let pose = &self.motions[id.index()].pose;
+            let p_p = pose.inverse_transform_point(&point.p.into()).coords;
+            let force = (point.normal * point.normal_impulse + point.shear_impulse) * (sign / self.params.dt);
+            state.add(layer, &p_p, &pose.rotation.inverse_transform_vector(&force));
+        };
+        let (soft, rigid) = self.problem.points.split_at(self.rows.len());
+        for (row, point) in self.rows.iter().zip(soft).filter(|(_, point)| point.normal_impulse > 0.0) {
+            if let ContactPartner::Collider(id) = row.partner {
+                load(id, point, -1.0);
+            }
+        }
+        for pressing in self.rigid_contacts.pressing(rigid) {
+            load(pressing.key.a, pressing.point, 1.0);
+            load(pressing.key.b, pressing.point, -1.0);
+        }
+        for ColliderPoint { collider, point, .. } in &self.resting {
+            if let (Some(layer), Some(state)) =
+                (&self.collider(*collider).layer, &mut layers[collider.index()])
+                && self.are_resting(*collider, point.partner)
+            {
+                state.add(
+                    layer,
+                    &point.p_p,
+                    &(-(point.normal_p * point.pressure + point.shear_p) * point.area),
+                );
+            }
+        }
+        for (state, collider) in layers.iter_mut().zip(&self.colliders) {
+            if let (Some(state), Some(layer)) = (state, &collider.layer) {
+                state.update(layer);
+            }
+        }
+        self.layers = layers;
     }
 }
 

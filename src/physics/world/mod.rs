@@ -51,7 +51,7 @@ mod step_means;
 mod substeps;
 
 use crate::{
-    contact::{Collider, ColliderMotion, DetectionLimits},
+    contact::{Collider, ColliderMotion, DetectionLimits, LayerState},
     ids::{
         ArticulationId, AttachmentId, BodyId, ColliderId, ContactPartner, KinematicId, LinkId, RigidId,
         SoftId,
@@ -174,6 +174,8 @@ pub struct World {
     articulations: Vec<Articulation>,
     kinematic: Vec<KinematicFrame>,
     colliders: Vec<Collider>,
+    /// State of the elastic layer of each collider.
+    layers: Vec<Option<LayerState>>,
     attachments: Vec<Attachment>,
     assemblies: Vec<assembly::Assembly>,
     stats: SolverStats,
@@ -268,6 +270,7 @@ impl World {
         self.record_bonds();
         self.update_soft_history();
         self.update_rigid_history();
+        self.update_layers();
         self.put_resting_to_sleep();
         self.check_state()
     }

@@ -40,6 +40,8 @@ struct PointState {
     stretch: Vec3,
     /// Normal impulse of the last step, N s.
     normal_impulse: f64,
+    /// Tangential impulse of the last step on the first collider, in the second's frame, N s.
+    shear_impulse: Vec3,
     is_sliding: bool,
     /// Distance slipped since first contact, m.
     slip_distance: f64,
@@ -47,7 +49,14 @@ struct PointState {
 
 impl PointState {
     fn first(key: PointKey) -> Self {
-        Self { key, stretch: Vec3::zeros(), normal_impulse: 0.0, is_sliding: false, slip_distance: 0.0 }
+        Self {
+            key,
+            stretch: Vec3::zeros(),
+            normal_impulse: 0.0,
+            shear_impulse: Vec3::zeros(),
+            is_sliding: false,
+            slip_distance: 0.0,
+        }
     }
 }
 
@@ -55,6 +64,10 @@ impl PointState {
 #[derive(Clone, Copy, Debug)]
 struct RigidRow {
     key: PointKey,
+    /// Area that the point represents, m².
+    area: f64,
+    /// Motion of the rest position of the springs, m, world.
+    rest: Vec3,
     /// Distance slipped before this step, m.
     slip_distance: f64,
 }
@@ -82,6 +95,8 @@ pub(super) struct RigidContacts {
 /// A solved point of two colliders that presses.
 pub(super) struct PressingPoint<'a> {
     pub key: PointKey,
+    /// Area that the point represents, m².
+    pub area: f64,
     /// Distance slipped before this step, m.
     pub slip_distance: f64,
     pub point: &'a ContactPoint,
@@ -118,9 +133,15 @@ impl World {
             for (pair, point) in &contacts.found {
                 let key = PointKey { a, b, pair: *pair, feature: point.feature };
                 let at = contacts.states.binary_search_by_key(&key, |state| state.key);
-                let state = at.map_or(PointState::first(key), |at| contacts.states[at]);
-                self.push_rigid(point, &state, end_b == Endpoint::Known);
-                contacts.rows.push(RigidRow { key, slip_distance: state.slip_distance });
+                let known = at.ok().map(|at| contacts.states[at]);
+                let state = known.unwrap_or(PointState::first(key));
+                let rest = self.push_rigid(point, &state, known.is_none(), end_b == Endpoint::Known);
+                contacts.rows.push(RigidRow {
+                    key,
+                    area: point.area,
+                    rest,
+                    slip_distance: state.slip_distance,
+                });
             }
             let last = self.problem.points.len();
             self.problem.clusters.push(ContactCluster { a: end_a, b: end_b, first, last });
@@ -177,22 +198,44 @@ impl World {
         GroupedAabb { bounds: bounds.loosened(self.contact_margin(speed)), group }
     }
 
-    fn push_rigid(&mut self, point: &ManifoldPoint, state: &PointState, is_b_known: bool) {
-        let (a, b) = (self.collider(state.key.a), self.collider(state.key.b));
+    /// Adds a contact, and returns the motion of the rest position of its springs, m, world.
+    fn push_rigid(
+        &mut self,
+        point: &ManifoldPoint,
+        state: &PointState,
+        is_first: bool,
+        is_b_known: bool,
+    ) -> Vec3 {
         let motion = &self.motions[state.key.b.index()];
+        let impulse = motion.pose.rotation * state.shear_impulse + point.normal_w * state.normal_impulse;
+        let traction = impulse * (self.growth() / (self.params.dt * point.area));
+        let (stiffness_a, rest_a) =
+            self.surface_at(state.key.a, &point.position_w, &point.normal_w, &traction);
+        let (stiffness_b, rest_b) =
+            self.surface_at(state.key.b, &point.position_w, &point.normal_w, &-traction);
+        let rest = rest_b - rest_a;
+        let (a, b) = (self.collider(state.key.a), self.collider(state.key.b));
         let surface = SurfaceContact {
             p: point.position_w,
             normal: point.normal_w,
             gap: point.gap,
             area: point.area,
-            stretch: motion.pose.rotation * state.stretch,
+            // Surfaces are touched where they have moved to.
+            stretch: if is_first { rest } else { motion.pose.rotation * state.stretch },
+            rest,
             previous_normal_impulse: state.normal_impulse * self.growth(),
             is_sliding: state.is_sliding,
         };
         let drift = if is_b_known { motion.velocity(&point.position_w) } else { Vec3::zeros() };
-        let point =
-            surface.contact_point(&a.friction.with(&b.friction), &a.stiffness.in_series(&b.stiffness));
-        self.problem.points.push(ContactPoint { drift, ..point });
+        // A rigid surface does not yield to a layer.
+        let stiffness = match (&a.layer, &b.layer) {
+            (Some(_), None) => stiffness_a,
+            (None, Some(_)) => stiffness_b,
+            _ => stiffness_a.in_series(&stiffness_b),
+        };
+        let solved = surface.contact_point(&a.friction.with(&b.friction), &stiffness);
+        self.problem.points.push(ContactPoint { drift, ..solved });
+        rest
     }
 
     /// Updates the state of the points that touched. Pairs of which neither side moves keep theirs.
@@ -208,12 +251,14 @@ impl World {
                 continue;
             }
             let SpringUpdate { stretch, slipped } = SpringUpdate::new(point, dt);
-            let kept = if slipped > 0.0 { stretch * (1.0 - slipped / stretch.norm()) } else { stretch };
+            let kept =
+                if slipped > 0.0 { stretch * (1.0 - slipped / stretch.norm()) } else { stretch } + row.rest;
             let rotation = &self.motions[row.key.b.index()].pose.rotation;
             contacts.states.push(PointState {
                 key: row.key,
                 stretch: rotation.inverse_transform_vector(&kept),
                 normal_impulse: point.normal_impulse,
+                shear_impulse: rotation.inverse_transform_vector(&point.shear_impulse),
                 is_sliding: sliding.contains(row.key.surfaces()),
                 slip_distance: row.slip_distance + slipped,
             });
@@ -243,9 +288,10 @@ impl RigidContacts {
         solved: &'a [ContactPoint],
     ) -> impl Iterator<Item = PressingPoint<'a>> {
         let pressing = self.rows.iter().zip(solved).filter(|(_, point)| point.normal_impulse > 0.0);
-        pressing.map(|(RigidRow { key, slip_distance }, point)| PressingPoint {
-            key: *key,
-            slip_distance: *slip_distance,
+        pressing.map(|(row, point)| PressingPoint {
+            key: row.key,
+            area: row.area,
+            slip_distance: row.slip_distance,
             point,
         })
     }

@@ -186,9 +186,7 @@ impl World {
             let PointKey { a, b, .. } = solved.key;
             for (own, other, sign) in [(a, b, -1.0), (b, a, 1.0)] {
                 if wanted(own, other.into()) {
-                    let [a, b] = [a, b].map(|id| &self.collider(id).stiffness);
-                    let area = solved.point.stiffness / a.in_series(b).normal;
-                    let point = self.patch_point(own, other.into(), None, solved.point, sign, area);
+                    let point = self.patch_point(own, other.into(), None, solved.point, sign, solved.area);
                     points.push(ColliderPoint { collider: own, key: Some(solved.key), point });
                 }
             }

@@ -219,26 +219,32 @@ impl World {
         let SoftColliderCandidate { soft: id, collider, candidate } = *found;
         let partner = ContactPartner::Collider(collider);
         let (soft, motion) = (self.soft(id), &self.motions[collider.index()]);
-        let collider = self.collider(collider);
         let sample = &soft.state.model.samples[candidate.sample];
         let p_in_collider = motion.pose.inverse_transform_point(&candidate.p.into()).coords;
-        let record = soft
-            .history
-            .get(candidate.sample, partner, soft.steps_awake)
-            .copied()
-            .unwrap_or(ContactRecord::first(partner, p_in_collider));
+        let known = soft.history.get(candidate.sample, partner, soft.steps_awake).copied();
+        let mut record = known.unwrap_or(ContactRecord::first(partner, p_in_collider));
+        let area = sample.surface.area * candidate.coverage;
+        let impulse = motion.pose.rotation * record.shear_impulse + candidate.normal * record.normal_impulse;
+        let traction = -impulse * (self.growth() / (self.params.dt * area));
+        let (stiffness, rest) = self.surface_at(collider, &candidate.p, &candidate.normal, &traction);
+        if known.is_none() {
+            // The surface is touched where it has moved to.
+            record.anchor -= motion.pose.rotation.inverse_transform_vector(&rest);
+        }
         let anchor_w = (motion.pose * nalgebra::Point3::from(record.anchor)).coords;
+        let collider = self.collider(collider);
         let surface = SurfaceContact {
             p: candidate.p,
             normal: candidate.normal,
             gap: candidate.gap,
-            area: sample.surface.area * candidate.coverage,
+            area,
             stretch: candidate.p - anchor_w,
+            rest,
             previous_normal_impulse: record.normal_impulse * self.growth(),
             is_sliding: record.is_sliding,
         };
         let (friction, stiffness) =
-            (collider.friction.with(&soft.friction), collider.stiffness.in_series(&soft.stiffness));
+            (collider.friction.with(&soft.friction), stiffness.in_series(&soft.stiffness));
         let is_known = *b == Endpoint::Known;
         let point = ContactPoint {
             weights_a: sample.weights,
@@ -298,6 +304,7 @@ impl World {
             gap: contact.gap,
             area: data.surface.area * contact.coverage * share,
             stretch,
+            rest: Vec3::zeros(),
             previous_normal_impulse: record.normal_impulse * self.growth(),
             is_sliding: record.is_sliding,
         };
@@ -335,6 +342,7 @@ impl World {
                 step: soft.steps_awake,
                 anchor: row.anchor,
                 normal_impulse: point.normal_impulse,
+                shear_impulse: row.to_anchor * point.shear_impulse,
                 is_sliding: sliding.contains(row.pair()),
                 slip_distance: row.slip_distance,
             };

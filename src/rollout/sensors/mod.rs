@@ -32,7 +32,7 @@ use softvt_sensing::{
     },
     tactile::{
         GelScratch, PadWrench, PlacedSkin, SkinMesh, SubstrateCompliance, TactileContact, TactileReading,
-        TactileSkin, Taxels, patch_friction,
+        TactileSkin, Taxels,
     },
 };
 
@@ -354,7 +354,7 @@ impl Sensors {
         let contact = TactileContact {
             wrench: PadWrench::from_patch(patch),
             skins: &skins,
-            friction: patch_friction(patch).unwrap_or(self.robot.pads.static_mu),
+            points: &patch.points,
             substrate: if placed.len() == 1 { substrate } else { None },
         };
         let mut reading = sensor.read(&contact, &mut self.gel_scratch)?;

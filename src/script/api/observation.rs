@@ -229,8 +229,8 @@ class! {
             /// Returns the mean displacement towards the fingertip or across, as of an object that slips out of the
             /// grasp; 0 if it is pushed in.
             fn outward_shear(_, this) -> ["number"] { this.flow.drag() }
-            /// Returns the trace of the displacement gradient; positive where an indentation
-            /// pushes the markers outwards.
+            /// Returns the trace of the displacement gradient; positive where an indentation pushes the markers
+            /// outwards, negative where a soft flat body draws them together.
             fn divergence(_, this) -> ["number"] { this.flow.divergence() }
             /// Returns the rotation of the markers, rad; positive is clockwise in the image.
             fn twist(_, this) -> ["number"] { this.flow.twist() }

@@ -116,8 +116,8 @@ impl LuaSimulation {
         let clock = app_data::<Clock>(lua)?;
         let _pause = clock.pause();
         let assets = app_data::<AssetCache>(lua)?;
-        let mut sim = Simulation::new(scene, &settings.physics, &settings.robot, &assets)
-            .map_err(|e| fail!(lua, "softvt.simulate: {e}"))?;
+        let mut sim =
+            Simulation::new(scene, settings, &assets).map_err(|e| fail!(lua, "softvt.simulate: {e}"))?;
         let soft_bytes: usize = sim.world.soft_bodies().iter().map(|soft| soft.state.model.bytes()).sum();
         let reserved = reserve_in_world(lua, BYTES_PER_SIMULATION + soft_bytes)?;
         sim.settle().map_err(|e| {

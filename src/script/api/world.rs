@@ -28,11 +28,11 @@ use softvt_evaluation::deformation::{Deformation, ReferenceShape};
 use softvt_geometry::{Pose, Quat, Vec3, shape::Shape};
 use softvt_physics::{
     AttachmentId, BodyId, ColliderId, ContactPartner, KinematicId, PhysicsParams, SoftId, World,
-    contact::{Collider, Friction, SurfaceStiffness},
+    contact::Friction,
     fem::{FemState, StrainLimits, StrainMeter},
     world::{ContactSummary, Penetration, SoftBody, StepFailure},
 };
-use softvt_robot::{PadSpec, pads::PadSurface};
+use softvt_robot::{PadSpec, pads::PadSurface, tactile::GelSpec};
 use softvt_rollout::{MAX_OVERLAP, SettledBox, soft_model};
 use softvt_scene::SoftMaterial;
 
@@ -323,10 +323,10 @@ impl LuaWorld {
     fn add_gel_pad(&self, lua: &Lua, spec: &WorldGelPadSpec) -> mlua::Result<LuaSolid> {
         let law = PadSpec::default();
         let friction = Friction::new(law.static_mu, law.dynamic_mu);
-        let stiffness = SurfaceStiffness { normal: law.normal_modulus, shear: law.tangential_modulus };
         self.add_solid(lua, 0, pose(spec.position, spec.axis_angle), true, |world, parent, _| {
-            let (surface, pose) = (Arc::new(PadSurface::default()), gel_pose_on_carrier());
-            world.add_collider(Collider::new(&spec.name, parent, pose, surface, friction, stiffness))
+            let (pad, gel) = (PadSurface::default(), GelSpec::default());
+            let layer = pad.layer(&gel);
+            world.add_collider(pad.collider(&spec.name, parent, gel_pose_on_carrier(), friction, &layer))
         })
     }
 

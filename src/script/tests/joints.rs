@@ -38,8 +38,7 @@ fn thin_walls_are_refused_at_the_placement() {
     let thin = chest(SLIDER, "")
         .replace("shape = box:translate(0, 0, 0.05)", "shape = box:shell(0.0015):translate(0, 0, 0.05)");
     let scene = open(&suite(&thin, "scene:add { name = 'chest', asset = chest, at = { 0, 0 } }")).unwrap();
-    let built =
-        Simulation::new(Arc::new(scene), &Default::default(), &Default::default(), &AssetCache::default());
+    let built = Simulation::new(Arc::new(scene), &Default::default(), &AssetCache::default());
     let message = built.expect_err("too thin").to_string();
     let expected = "9: asset chest: part drawer: its walls are about 1.6 mm thick, expected at least 4 mm";
     assert!(message.contains(expected), "{message}");
@@ -57,8 +56,7 @@ fn scene_and_physics_agree_on_part_poses() {
     assert_eq!(object.joints, [0.05, 0.6, 0.2], "the knob starts at its nearest limit");
     assert_eq!(object.asset.parts()[1].joint.motion, JointMotion::Turn);
     let placed = softvt_scene::part_poses(object.asset.parts(), &object.joints);
-    let sim =
-        Simulation::new(Arc::new(scene), &Default::default(), &Default::default(), &AssetCache::default());
+    let sim = Simulation::new(Arc::new(scene), &Default::default(), &AssetCache::default());
     let sim = sim.expect("builds");
     let names: Vec<&str> = sim.objects.iter().map(|o| o.name.as_str()).collect();
     assert_eq!(names, ["chest", "chest.drawer", "chest.door", "chest.knob", "marble"]);

@@ -21,7 +21,7 @@ mod tests;
 pub use self::{
     elastic::{
         Gel, GelField, GelScratch, PadWrench, SkinMesh, SubstrateCompliance, TactileContact,
-        TactileContactError, Taxels, patch_friction,
+        TactileContactError, Taxels,
     },
     image::{
         HISTORY_LENGTH, OpticsError, PolynomialOptics, TactileMosaicLayout, TaximOptics, mosaic, mosaic_cell,

@@ -55,7 +55,7 @@ enum OpticsBackend {
 /// let contact = TactileContact {
 ///     wrench: PadWrench::new(1.5, [0.0; 2], 0.0, [0.0; 2]),
 ///     skins: &[SkinMesh { vertices: &vertices, triangles: &triangles }],
-///     friction: 1.5,
+///     points: &[],
 ///     substrate: None,
 /// };
 /// let reading = sensor.read(&contact, &mut GelScratch::default())?;

@@ -13,7 +13,7 @@ use softvt_robot::tactile::TactileSpec;
 fn imprint(height: impl Fn(f64, f64) -> f64, wrench: PadWrench) -> RgbImage {
     let sensor = TactileSensor::new(&TactileSpec::default()).expect("default numbers");
     let skin = graph(16e-3, 2e-4, height);
-    let contact = TactileContact { wrench, skins: &[skin.mesh()], friction: 1.5, substrate: None };
+    let contact = TactileContact { wrench, skins: &[skin.mesh()], points: &[], substrate: None };
     let reading = sensor.read(&contact, &mut GelScratch::default()).expect("a good contact");
     let mut both = RgbImage::new(640, 240);
     replace(&mut both, &reading.image, 0, 0);

@@ -4,10 +4,11 @@ use std::sync::Arc;
 
 use nalgebra::Vector2;
 
-use super::{elastic_layer::LayerResponse, height_map::FINE, substrate::SubstrateCompliance};
+use super::{height_map::FINE, substrate::SubstrateCompliance};
 use softvt_common::range::RangeError;
+use softvt_physics::contact::{LayerMaterial, LayerResponse};
 use softvt_robot::PadSurface;
-use softvt_robot::tactile::{GelSpec, OpticsModel, Pinhole, TactileSpec};
+use softvt_robot::tactile::{OpticsModel, Pinhole, TactileSpec};
 use softvt_signal::fourier::{Complex32, FftBuffers, PaddedFft};
 
 /// Grid over the pad, kernels of the bonded layer and view of the camera: everything that is computed once per sensor.
@@ -43,7 +44,7 @@ pub(super) struct LayerKernels {
     pub(super) normal: Vec<f32>,
     /// Tangential displacement by shear: components xx, xy and yy.
     pub(super) tangential: [Vec<f32>; 3],
-    /// Coupling of both: m k_x/k and m k_y/k ([`super::elastic_layer`]).
+    /// Coupling of both: m k_x/k and m k_y/k ([`LayerResponse`]).
     pub(super) coupling: [Vec<f32>; 2],
     /// Wave number, 1/m.
     pub(super) k: Vec<f32>,
@@ -76,7 +77,7 @@ impl Gel {
         // Periodic images of a contact act on each other only across the full width of the pad: there, one and a half
         // thicknesses away, a load moves the surface by less than 2 % of its displacement under the load.
         let fft = PaddedFft::new(columns, rows, (1.5 * pad.thickness / cell).ceil() as usize);
-        let kernels = Arc::new(LayerKernels::new(&fft, &spec.gel, pad.thickness));
+        let kernels = Arc::new(LayerKernels::new(&fft, &spec.gel.layer(&pad), cell));
         // Taxim shows the skins themselves; other optics show the surface of the gel, which presses details of soft
         // skins flat.
         let soft_skin_points = if matches!(spec.optics, OpticsModel::Taxim { .. }) { FINE } else { 1 };
@@ -103,7 +104,7 @@ impl Gel {
 }
 
 impl LayerKernels {
-    fn new(fft: &PaddedFft, spec: &GelSpec, thickness: f64) -> Self {
+    fn new(fft: &PaddedFft, layer: &LayerMaterial, cell: f64) -> Self {
         let size = fft.half_width * fft.height;
         let empty = || Vec::with_capacity(size);
         let mut kernels = Self {
@@ -115,9 +116,9 @@ impl LayerKernels {
         let scale = 1.0 / (fft.width * fft.height) as f64;
         for ix in 0..fft.half_width {
             for iy in 0..fft.height {
-                let k = fft.wave_vector(ix, iy, spec.cell);
+                let k = fft.wave_vector(ix, iy, cell);
                 let magnitude = k[0].hypot(k[1]);
-                let response = LayerResponse::new(spec, thickness, magnitude);
+                let response = LayerResponse::new(layer, magnitude);
                 let unit = if magnitude > 0.0 { k.map(|k| k / magnitude) } else { [0.0; 2] };
                 // The sign of a Nyquist frequency is not defined; odd kernels leave it out.
                 let is_nyquist = [2 * ix == fft.width, 2 * iy == fft.height];

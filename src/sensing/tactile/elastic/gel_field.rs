@@ -8,9 +8,9 @@ use super::{
     normal_contact::solve_normal_contact,
     pad_wrench::{PadWrench, Taxels},
     substrate::SubstrateCompliance,
-    tangential_contact::{PlanarMotion, apply_shear_kernel, solve_tangential_contact, spring_stiffness},
 };
 use softvt_geometry::{Mat3, Vec3};
+use softvt_physics::world::PatchPoint;
 use softvt_signal::fourier::Complex32;
 
 /// Contact of bodies with a pad: the input of [`GelField::solve`].
@@ -18,10 +18,11 @@ use softvt_signal::fourier::Complex32;
 pub struct TactileContact<'a> {
     /// Force and moment on the gel, from the solver.
     pub wrench: PadWrench,
+    /// The solver's contact points, which say how the shear is distributed. Without any, it is in proportion to the
+    /// pressure.
+    pub points: &'a [PatchPoint],
     /// Surfaces of the touching bodies.
     pub skins: &'a [SkinMesh<'a>],
-    /// Coefficient of friction of gel and bodies, the bound of shear over pressure; see [`super::patch_friction`].
-    pub friction: f64,
     /// Compliance of the touching body in series with the gel; `None` presses its surface in unchanged,
     /// like a rigid stamp.
     pub substrate: Option<SubstrateCompliance>,
@@ -38,11 +39,9 @@ pub struct GelField {
     pub displacement: [Vec<f32>; 3],
     /// Rigid approach of the skins from their given position, m; negative if they were pulled back.
     pub approach: f64,
-    /// Rigid motion of the sticking part of the contact.
-    pub stick_motion: PlanarMotion,
-    /// Ratio of the friction that the shear needs to the friction given: 1, or more where friction could
-    /// not hold the load.
-    pub friction_excess: f64,
+    /// Mean motion of the contact along the surface: the rigid one that is nearest to its displacement, weighted by
+    /// pressure.
+    pub motion: PlanarMotion,
     /// True if the skins keep their shape also below the size of a cell.
     pub(in super::super) has_rigid_skin: bool,
     /// The skins in their final position.
@@ -62,9 +61,9 @@ pub enum TactileContactError {
 impl GelField {
     /// Solves a contact; `None` if nothing presses, or only outside the grid.
     ///
-    /// The skins are pressed in until the pressure carries the normal force of the wrench; then the shear is
-    /// found that carries its tangential force and twist. The result does not depend on earlier calls:
-    /// `scratch` keeps working memory, and the compliance of the last gel and body.
+    /// The skins are pressed in until the pressure carries the normal force of the wrench. The shear over the pressure
+    /// is that of the solver's points around each cell. The result does not depend on earlier calls: `scratch` keeps
+    /// working memory, and the compliance of the last gel and body.
     ///
     /// # Errors
     /// A number is not finite, or there is a pressing force but no skin.
@@ -74,7 +73,7 @@ impl GelField {
         scratch: &mut GelScratch,
     ) -> Result<Option<Self>, TactileContactError> {
         validate(contact)?;
-        let TactileContact { wrench, skins, friction, substrate } = contact;
+        let TactileContact { wrench, points, skins, substrate } = contact;
         if wrench.normal() <= 0.0 {
             return Ok(None);
         }
@@ -89,22 +88,22 @@ impl GelField {
         let Some(normal) = solve_normal_contact(gel, &height_map.gaps(gel), wrench.normal(), scratch) else {
             return Ok(None);
         };
-        let load = Vec3::new(wrench.force.x, wrench.force.y, wrench.moment.z);
-        let tangential = solve_tangential_contact(gel, &normal.pressure, &load, *friction, scratch);
-        let displacement = surface_displacement(gel, &normal.pressure, &tangential.traction, scratch);
         height_map.height.iter_mut().for_each(|z| *z -= normal.approach as f32);
         // In double precision, and scaled so that it integrates to the force exactly.
         let mut pressure: Vec<f64> = normal.pressure.iter().map(|&p| f64::from(p)).collect();
         let scale = wrench.normal() / (gel.cell * gel.cell) / pressure.iter().sum::<f64>();
         pressure.iter_mut().for_each(|p| *p *= scale);
-        let shear = balanced_shear(gel, &pressure, &tangential.traction, &load);
+        let load = Vec3::new(wrench.force.x, wrench.force.y, wrench.moment.z);
+        let shear = balanced_shear(gel, &pressure, &ShearShares::new(gel, points, &pressure), &load);
+        let narrowed = shear.each_ref().map(|along| along.iter().map(|&t| t as f32).collect());
+        let displacement = surface_displacement(gel, &normal.pressure, &narrowed, scratch);
+        let motion = mean_motion(gel, &pressure, &displacement);
         Ok(Some(Self {
             pressure,
             shear,
             displacement,
             approach: normal.approach,
-            stick_motion: tangential.motion,
-            friction_excess: tangential.friction_excess,
+            motion,
             has_rigid_skin: substrate.is_none(),
             height_map,
         }))
@@ -191,14 +190,13 @@ pub(in super::super) fn cubic_taps(position: f64) -> CubicTaps {
 }
 
 fn validate(contact: &TactileContact) -> Result<(), TactileContactError> {
-    let TactileContact { wrench, friction, substrate, .. } = contact;
+    let TactileContact { wrench, substrate, .. } = contact;
     let substrate = substrate.unwrap_or(SubstrateCompliance { modulus: 1.0, resolved: 1.0 });
     for (field, value, is_valid, condition) in [
         ("force along x", wrench.force.x, true, ""),
         ("force along y", wrench.force.y, true, ""),
         ("force along z", wrench.force.z, true, ""),
         ("moment about z", wrench.moment.z, true, ""),
-        ("friction", *friction, *friction >= 0.0, " of at least 0"),
         ("substrate.modulus", substrate.modulus, substrate.modulus > 0.0, " above 0"),
         ("substrate.resolved", substrate.resolved, substrate.resolved > 0.0, " above 0"),
     ] {
@@ -227,8 +225,9 @@ pub(super) fn surface_displacement(
         let along = sx[i] * mx[i] + sy[i] * my[i];
         sz[i] = Complex32::new(along.im, -along.re) - sp[i] * gel.kernels.normal[i];
     }
-    apply_shear_kernel(gel, sx, sy);
+    let [xx, xy, yy] = &gel.kernels.tangential;
     for i in 0..sp.len() {
+        (sx[i], sy[i]) = (sx[i] * xx[i] + sy[i] * xy[i], sx[i] * xy[i] + sy[i] * yy[i]);
         let outwards = Complex32::new(sp[i].im, -sp[i].re);
         sx[i] += outwards * mx[i];
         sy[i] += outwards * my[i];
@@ -239,16 +238,96 @@ pub(super) fn surface_displacement(
     out
 }
 
-/// The shear in double precision, with a correction of rounding size so that it integrates to `load` exactly.
-fn balanced_shear(gel: &Gel, pressure: &[f64], traction: &[Vec<f32>; 2], load: &Vec3) -> [Vec<f64>; 2] {
-    let mut shear = [0, 1].map(|a| traction[a].iter().map(|&t| f64::from(t)).collect::<Vec<f64>>());
+/// Rigid motion along the surface, about the pad's origin.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct PlanarMotion {
+    /// Displacement along x, m.
+    pub x: f64,
+    /// Displacement along y, m.
+    pub y: f64,
+    /// Rotation about the pad's z axis, rad (small).
+    pub angle: f64,
+}
+
+impl PlanarMotion {
+    /// Displacement of a point, m.
+    pub fn at(&self, p: &Vector2<f64>) -> Vector2<f64> {
+        Vector2::new(self.x - self.angle * p.y, self.y + self.angle * p.x)
+    }
+}
+
+impl From<Vec3> for PlanarMotion {
+    fn from(v: Vec3) -> Self {
+        Self { x: v.x, y: v.y, angle: v.z }
+    }
+}
+
+/// Shear of contact points over the pressure of the field, on a grid of nodes [`Self::SPACING`] apart: the pressure
+/// around a node carries the shear of the points around it.
+struct ShearShares {
+    columns: usize,
+    rows: usize,
+    /// Of each node, along x and y.
+    shares: Vec<Vector2<f64>>,
+}
+
+impl ShearShares {
+    /// Distance of the nodes, m: a little more than that of the points.
+    const SPACING: f64 = 1e-3;
+
+    fn new(gel: &Gel, points: &[PatchPoint], pressure: &[f64]) -> Self {
+        let count = |length: f64| (length / Self::SPACING).ceil() as usize + 2;
+        let (columns, rows) = (count(gel.pad.length), count(gel.pad.width));
+        let mut found = Self { columns, rows, shares: vec![Vector2::zeros(); columns * rows] };
+        for point in points {
+            let traction = -(point.normal_p * point.pressure + point.shear_p);
+            for (node, share) in found.around(point.p_p.xy()) {
+                found.shares[node] += traction.xy() * (point.area * share);
+            }
+        }
+        let mut pressed = vec![0.0; columns * rows];
+        for (c, p) in pressure.iter().enumerate().filter(|(_, p)| **p > 0.0) {
+            for (node, share) in found.around(gel.centre(c)) {
+                pressed[node] += p * gel.cell * gel.cell * share;
+            }
+        }
+        for (share, force) in found.shares.iter_mut().zip(pressed) {
+            *share = if force > 0.0 { *share / force } else { Vector2::zeros() };
+        }
+        found
+    }
+
+    /// Shear over pressure at a point, along x and y.
+    fn at(&self, p: Vector2<f64>) -> Vector2<f64> {
+        self.around(p).iter().map(|&(node, share)| self.shares[node] * share).sum()
+    }
+
+    /// The four nodes around a point, and its share of each.
+    fn around(&self, p: Vector2<f64>) -> [(usize, f64); 4] {
+        let along = |x: f64, count: usize| {
+            let last = (count - 1) as f64;
+            let at = (x / Self::SPACING + 0.5 * last).clamp(0.0, last - 1e-9);
+            (at as usize, at.fract())
+        };
+        let ((i, u), (j, v)) = (along(p.x, self.columns), along(p.y, self.rows));
+        let node = |a: usize, b: usize| (j + b) * self.columns + i + a;
+        let [left, low] = [1.0 - u, 1.0 - v];
+        [(node(0, 0), left * low), (node(1, 0), u * low), (node(0, 1), left * v), (node(1, 1), u * v)]
+    }
+}
+
+/// Shear of each cell by these shares of its pressure, corrected so that it integrates to `load`: by a share that is a
+/// rigid motion.
+fn balanced_shear(gel: &Gel, pressure: &[f64], shares: &ShearShares, load: &Vec3) -> [Vec<f64>; 2] {
+    let mut shear = [0, 1].map(|_| vec![0.0; pressure.len()]);
     let mut stiffness = Mat3::zeros();
     let mut missing = load / (gel.cell * gel.cell);
     let touching: Vec<usize> = (0..pressure.len()).filter(|&c| pressure[c] > 0.0).collect();
     for &c in &touching {
         let at = gel.centre(c);
-        let (tx, ty) = (shear[0][c], shear[1][c]);
-        missing -= Vec3::new(tx, ty, at.x * ty - at.y * tx);
+        let t = pressure[c] * shares.at(at);
+        (shear[0][c], shear[1][c]) = (t.x, t.y);
+        missing -= Vec3::new(t.x, t.y, at.x * t.y - at.y * t.x);
         stiffness += spring_stiffness(&at, pressure[c]);
     }
     if let Some(inverse) = stiffness.try_inverse() {
@@ -260,4 +339,23 @@ fn balanced_shear(gel: &Gel, pressure: &[f64], traction: &[Vec<f32>; 2], load: &
         }
     }
     shear
+}
+
+/// The rigid motion along the surface that is nearest to a displacement, weighted by pressure.
+fn mean_motion(gel: &Gel, pressure: &[f64], displacement: &[Vec<f32>; 3]) -> PlanarMotion {
+    let (mut stiffness, mut moved) = (Mat3::zeros(), Vec3::zeros());
+    for c in (0..pressure.len()).filter(|&c| pressure[c] > 0.0) {
+        let (at, p) = (gel.centre(c), pressure[c]);
+        let [x, y] = [0, 1].map(|axis| p * f64::from(displacement[axis][c]));
+        moved += Vec3::new(x, y, at.x * y - at.y * x);
+        stiffness += spring_stiffness(&at, p);
+    }
+    stiffness.try_inverse().map_or(PlanarMotion::default(), |inverse| (inverse * moved).into())
+}
+
+/// Force and moment by rigid motions of a spring of stiffness `w` at a point.
+fn spring_stiffness(p: &Vector2<f64>, w: f64) -> Mat3 {
+    let (x, y) = (p.x, p.y);
+    let moment = w * (x * x + y * y);
+    Mat3::new(w, 0.0, -w * y, 0.0, w, w * x, -w * y, w * x, moment)
 }

@@ -40,19 +40,6 @@ impl PadWrench {
     }
 }
 
-/// Coefficient of friction of a contact patch: the mean over its points, weighted by normal force.
-/// `None` without a force.
-///
-/// The coefficient of a point belongs to the pair of pad and body (the larger of both), static or,
-/// while they slide, dynamic.
-pub fn patch_friction(patch: &ContactPatch) -> Option<f64> {
-    let sum = patch.points.iter().fold([0.0; 2], |[bound, force], point| {
-        let normal = point.pressure * point.area;
-        [bound + point.mu * normal, force + normal]
-    });
-    (sum[1] > 0.0).then(|| sum[0] / sum[1])
-}
-
 /// Pressure and shear on a grid of taxels over the pad: row by row from −y to +y, each row from −x to +x.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Taxels {
@@ -144,17 +131,6 @@ mod tests {
         // r × f: (2 mm, 0) × (−5 mN, 0, −20 mN) and (0, −3 mm) × (0, 0, −40 mN).
         assert!((wrench.moment - Vec3::new(1.2e-4, 4e-5, 0.0)).norm() < 1e-11, "{wrench:?}");
         assert!((wrench.normal() - 0.06).abs() < 1e-9);
-    }
-
-    #[test]
-    fn the_friction_of_a_patch_is_the_mean_by_force() {
-        let (mut patch, _) = patch();
-        patch.points[0].mu = 0.3;
-        // 20 mN at 0.3 and 40 mN at 1.5.
-        let mean = patch_friction(&patch).expect("a force");
-        assert!((mean - 1.1).abs() < 1e-12, "{mean}");
-        patch.points.clear();
-        assert_eq!(patch_friction(&patch), None);
     }
 
     #[test]

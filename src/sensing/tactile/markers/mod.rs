@@ -81,8 +81,8 @@ fn fots(gel: &Gel, law: &FotsSpec, field: &GelField, initial: &MarkerPositions) 
     let (scale, middle) = (law.scale * 1e3, Vector2::new(160.0, 120.0));
     let centre_p = field.centre(gel);
     let centre = middle + scale * centre_p;
-    let shift = scale * field.stick_motion.at(&centre_p);
-    let (sin, cos) = field.stick_motion.angle.sin_cos();
+    let shift = scale * field.motion.at(&centre_p);
+    let (sin, cos) = field.motion.angle.sin_cos();
     let initial = initial.map(|px| Vector2::from(px.map(f64::from)));
     let dents = initial.iter().filter_map(|px| {
         let p = (px - middle) / scale;

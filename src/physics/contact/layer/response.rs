@@ -12,28 +12,28 @@
 //! m changes its sign near α = 2: long waves of pressure squeeze a nearly incompressible layer outwards, where a half
 //! space is drawn inwards.
 
-use softvt_robot::tactile::GelSpec;
+use super::LayerMaterial;
 
 /// Displacement of the surface per unit of traction at one wave number k, m/Pa.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct LayerResponse {
+pub struct LayerResponse {
     /// Normal displacement by normal traction.
-    pub(super) normal: f64,
+    pub normal: f64,
     /// Displacement along k by shear along k.
-    pub(super) longitudinal: f64,
+    pub longitudinal: f64,
     /// Displacement across k by shear across k.
-    pub(super) transverse: f64,
+    pub transverse: f64,
     /// m of the module: displacement along k by pressure is −i m, outwards by shear along k is −i m.
-    pub(super) coupling: f64,
+    pub coupling: f64,
 }
 
 /// α beyond which the base has no influence (e⁻⁴⁰) and the hyperbolic functions would overflow.
 const MAX_ALPHA: f64 = 20.0;
 
 impl LayerResponse {
-    /// Response of a layer of this material and thickness h (m) at wave number `k`, 1/m.
-    pub(super) fn new(material: &GelSpec, thickness: f64, k: f64) -> Self {
-        let (nu, mu, h) = (material.poisson, material.shear_modulus, thickness);
+    /// Response of a layer at wave number `k`, 1/m.
+    pub fn new(layer: &LayerMaterial, k: f64) -> Self {
+        let &LayerMaterial { shear_modulus: mu, poisson: nu, thickness: h } = layer;
         if k * h < 1e-6 {
             let normal = h * (1.0 - 2.0 * nu) / (2.0 * mu * (1.0 - nu));
             return Self { normal, longitudinal: h / mu, transverse: h / mu, coupling: 0.0 };
@@ -73,8 +73,8 @@ mod tests {
     }
 
     /// (U, W) at the surface by solving the boundary conditions numerically.
-    fn solved(material: &GelSpec, h: f64, k: f64, shear: f64, normal: f64) -> [f64; 2] {
-        let (nu, mu) = (material.poisson, material.shear_modulus);
+    fn solved(layer: &LayerMaterial, k: f64, shear: f64, normal: f64) -> [f64; 2] {
+        let &LayerMaterial { shear_modulus: mu, poisson: nu, thickness: h } = layer;
         let (kappa, lambda) = (3.0 - 4.0 * nu, 2.0 * mu * nu / (1.0 - 2.0 * nu));
         let mut matrix = Matrix4::zeros();
         for i in 0..4 {
@@ -91,10 +91,10 @@ mod tests {
 
     #[test]
     fn the_closed_form_solves_the_layers_boundary_value_problem() {
-        let material = GelSpec { shear_modulus: 0.145, poisson: 0.475, ..GelSpec::default() };
+        let layer = LayerMaterial { shear_modulus: 0.145, poisson: 0.475, thickness: 4.0 };
         for k in [0.02, 0.1, 0.3, 0.7, 1.0, 2.0, 3.0] {
-            let found = LayerResponse::new(&material, 4.0, k);
-            let (shear, normal) = (solved(&material, 4.0, k, 1.0, 0.0), solved(&material, 4.0, k, 0.0, 1.0));
+            let found = LayerResponse::new(&layer, k);
+            let (shear, normal) = (solved(&layer, k, 1.0, 0.0), solved(&layer, k, 0.0, 1.0));
             for (a, b) in [
                 (found.longitudinal, shear[0]),
                 (found.coupling, shear[1]),
@@ -108,8 +108,8 @@ mod tests {
 
     #[test]
     fn the_response_to_short_waves_is_that_of_a_half_space() {
-        let material = GelSpec { shear_modulus: 1.0, poisson: 0.3, ..GelSpec::default() };
-        let found = LayerResponse::new(&material, 1.0, 200.0);
+        let layer = LayerMaterial { shear_modulus: 1.0, poisson: 0.3, thickness: 1.0 };
+        let found = LayerResponse::new(&layer, 200.0);
         let half_space = [0.7 / 200.0, 0.7 / 200.0, 1.0 / 200.0, -0.4 / 400.0];
         for (a, b) in
             [found.normal, found.longitudinal, found.transverse, found.coupling].into_iter().zip(half_space)
