@@ -1,8 +1,9 @@
 //! Elasticity of the gel: from force and shape of a contact to pressure, shear and displacement of the gel's surface.
 //!
 //! The gel is an elastic layer bonded to a rigid base. Its response is known in closed form for each wave number
-//! ([`LayerResponse`]) and applied by Fourier transforms ([`softvt_signal::fourier`]). `normal_contact` finds the
-//! pressure under a pressed shape; [`GelField::solve`] adds the shear of the solver's contact points.
+//! (`softvt_physics::contact::LayerResponse`) and applied by Fourier transforms ([`softvt_signal::fourier`]).
+//! `normal_contact` finds the pressure under a pressed shape; [`GelField::solve`] adds the shear of the solver's
+//! contact points.
 
 mod gel;
 mod gel_field;
