@@ -70,10 +70,10 @@ pub fn pads(report: &mut Report) {
          stick; the sensor's grid is too soft in twist for discs of few cells.\n"
     );
     header("disc mm | sideways % | twist %");
-    let mut behind = Vec::new();
+    let mut missing = Vec::new();
     for of in pad::DISCS {
         let followed = pad::followed(of.radius);
-        behind.extend(followed.map(|share| (1.0 - share).max(0.0)));
+        missing.extend(followed.map(|share| (1.0 - share).max(0.0)));
         row!("{} | {:.0} | {:.0}", 1e3 * of.radius, 100.0 * followed[0], 100.0 * followed[1]);
     }
     println!(
@@ -101,7 +101,7 @@ pub fn pads(report: &mut Report) {
     }
     report.claim("pad: stiffness of discs, normal and sideways", straight, 0.10);
     report.claim("pad: stiffness of discs in a twist", twists, 0.10);
-    report.claim("gel: part of the motion of a disc that it does not follow", behind, 0.10);
+    report.claim("gel: part of the motion of a disc that it does not follow", missing, 0.10);
     report.claim("pad: stick radius of a sheared ball", solver, 0.10);
     report.claim("gel: stick radius of a sheared ball", sensor, 0.10);
 }

@@ -6,6 +6,7 @@
 #![warn(missing_docs, unreachable_pub)]
 
 mod aabb;
+mod bilinear_grid;
 pub mod cavity;
 pub mod convex;
 pub mod hex8;
@@ -24,6 +25,7 @@ pub mod voxel;
 pub mod walls;
 
 pub use aabb::{Aabb, GroupedAabb, overlapping_pairs};
+pub use bilinear_grid::BilinearGrid;
 pub use linear_algebra::{Mat3, Pose, Quat, Vec3, basis_from_reference, orthonormal_basis};
 
 #[cfg(test)]

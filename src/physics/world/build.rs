@@ -118,7 +118,7 @@ impl World {
         let can_carry = self.has_solid(collider.parent);
         assert!(can_carry, "collider {}: {:?} cannot carry it", collider.name, collider.parent);
         self.wake_all();
-        self.layers.push(collider.layer.as_deref().map(LayerState::new));
+        self.layers.push(collider.layer.clone().map(LayerState::new));
         self.colliders.push(collider);
         ColliderId::new(self.colliders.len() - 1)
     }

@@ -77,32 +77,30 @@ impl World {
         id: ColliderId,
         p_w: &Vec3,
         normal: &Vec3,
-        traction: &Vec3,
+        traction: impl FnOnce() -> Vec3,
     ) -> (SurfaceStiffness, Vec3) {
-        let collider = self.collider(id);
-        let (Some(layer), Some(state)) = (&collider.layer, &self.layers[id.index()]) else {
-            return (collider.stiffness, Vec3::zeros());
+        let Some(state) = &self.layers[id.index()] else {
+            return (self.collider(id).stiffness, Vec3::zeros());
         };
+        let traction = traction();
         let pose = &self.motions[id.index()].pose;
         let p_p = pose.inverse_transform_point(&(*p_w).into()).coords;
-        let traction_p = pose.rotation.inverse_transform_vector(traction);
-        let moved = pose.rotation * state.moved_at(layer, &p_p, &traction_p);
-        let stiffness = state.stiffness_at(layer, &p_p);
-        (stiffness, moved - stiffness.compliance(traction, normal))
+        let traction_p = pose.rotation.inverse_transform_vector(&traction);
+        let moved = pose.rotation * state.moved_at(&p_p, &traction_p);
+        let stiffness = state.stiffness_at(&p_p);
+        (stiffness, moved - stiffness.compliance(&traction, normal))
     }
 
-    /// Loads the elastic layers with the solved points, and finds how they answer.
+    /// Loads the elastic layers with the solved points, and finds their displacements.
     pub(super) fn update_layers(&mut self) {
         let mut layers = std::mem::take(&mut self.layers);
         layers.iter_mut().flatten().for_each(LayerState::clear);
         let mut load = |id: ColliderId, point: &ContactPoint, sign: f64| {
-            let (Some(layer), Some(state)) = (&self.collider(id).layer, &mut layers[id.index()]) else {
-                return;
-            };
+            let Some(state) = &mut layers[id.index()] else { return };
             let pose = &self.motions[id.index()].pose;
             let p_p = pose.inverse_transform_point(&point.p.into()).coords;
             let force = (point.normal * point.normal_impulse + point.shear_impulse) * (sign / self.params.dt);
-            state.add(layer, &p_p, &pose.rotation.inverse_transform_vector(&force));
+            state.add(&p_p, &pose.rotation.inverse_transform_vector(&force));
         };
         let (soft, rigid) = self.problem.points.split_at(self.rows.len());
         for (row, point) in self.rows.iter().zip(soft).filter(|(_, point)| point.normal_impulse > 0.0) {
@@ -115,22 +113,13 @@ impl World {
             load(pressing.key.b, pressing.point, -1.0);
         }
         for ColliderPoint { collider, point, .. } in &self.resting {
-            if let (Some(layer), Some(state)) =
-                (&self.collider(*collider).layer, &mut layers[collider.index()])
+            if let Some(state) = &mut layers[collider.index()]
                 && self.are_resting(*collider, point.partner)
             {
-                state.add(
-                    layer,
-                    &point.p_p,
-                    &(-(point.normal_p * point.pressure + point.shear_p) * point.area),
-                );
+                state.add(&point.p_p, &(-(point.normal_p * point.pressure + point.shear_p) * point.area));
             }
         }
-        for (state, collider) in layers.iter_mut().zip(&self.colliders) {
-            if let (Some(state), Some(layer)) = (state, &collider.layer) {
-                state.update(layer);
-            }
-        }
+        layers.iter_mut().flatten().for_each(LayerState::update);
         self.layers = layers;
     }
 }

@@ -207,12 +207,14 @@ impl World {
         is_b_known: bool,
     ) -> Vec3 {
         let motion = &self.motions[state.key.b.index()];
-        let impulse = motion.pose.rotation * state.shear_impulse + point.normal_w * state.normal_impulse;
-        let traction = impulse * (self.growth() / (self.params.dt * point.area));
+        let traction = || {
+            let impulse = motion.pose.rotation * state.shear_impulse + point.normal_w * state.normal_impulse;
+            impulse * (self.growth() / (self.params.dt * point.area))
+        };
         let (stiffness_a, rest_a) =
-            self.surface_at(state.key.a, &point.position_w, &point.normal_w, &traction);
+            self.surface_at(state.key.a, &point.position_w, &point.normal_w, traction);
         let (stiffness_b, rest_b) =
-            self.surface_at(state.key.b, &point.position_w, &point.normal_w, &-traction);
+            self.surface_at(state.key.b, &point.position_w, &point.normal_w, || -traction());
         let rest = rest_b - rest_a;
         let (a, b) = (self.collider(state.key.a), self.collider(state.key.b));
         let surface = SurfaceContact {

@@ -224,9 +224,12 @@ impl World {
         let known = soft.history.get(candidate.sample, partner, soft.steps_awake).copied();
         let mut record = known.unwrap_or(ContactRecord::first(partner, p_in_collider));
         let area = sample.surface.area * candidate.coverage;
-        let impulse = motion.pose.rotation * record.shear_impulse + candidate.normal * record.normal_impulse;
-        let traction = -impulse * (self.growth() / (self.params.dt * area));
-        let (stiffness, rest) = self.surface_at(collider, &candidate.p, &candidate.normal, &traction);
+        let traction = || {
+            let impulse =
+                motion.pose.rotation * record.shear_impulse + candidate.normal * record.normal_impulse;
+            -impulse * (self.growth() / (self.params.dt * area))
+        };
+        let (stiffness, rest) = self.surface_at(collider, &candidate.p, &candidate.normal, traction);
         if known.is_none() {
             // The surface is touched where it has moved to.
             record.anchor -= motion.pose.rotation.inverse_transform_vector(&rest);

@@ -1,8 +1,8 @@
 //! Skins that are elastic layers on a rigid base, such as gel pads.
 //!
 //! A force anywhere on a layer moves its whole surface. The contact law of the solver is one of independent springs, so
-//! each step gives them a new rest position: with the tractions `t` of the last step, the displacement `C t` that the
-//! layer answers with, and a stiffness k, the springs rest at `C t − t/k`. Once a contact does not change, `t = k (δ −
+//! each step gives them a new rest position: with the tractions `t` of the last step, the displacement `C t` of the
+//! layer, and a stiffness k, the springs rest at `C t − t/k`. Once a contact does not change, `t = k (δ −
 //! C t) + t` with the imposed displacement δ, so `C t = δ`: contact, stick and slip are those of the layer. While it
 //! changes, the error falls by the factors `1 − λ` in each step, with the eigenvalues λ of `k C`. The stiffness at each
 //! point is `k = p / |C| p`, with the pressure p. So no λ is above 1 (Collatz and Wielandt), and what changes in
@@ -10,7 +10,9 @@
 
 mod response;
 
-use softvt_geometry::Vec3;
+use std::sync::Arc;
+
+use softvt_geometry::{BilinearGrid, Vec3};
 use softvt_signal::fourier::{Complex32, PaddedFft};
 
 pub use response::LayerResponse;
@@ -28,15 +30,14 @@ pub struct LayerMaterial {
     pub thickness: f64,
 }
 
-/// Edge of the cells of the grid on which a layer answers, m.
+/// Edge of the cells of the grid of a layer, m.
 const CELL: f64 = 1.5e-3;
 
 /// Response of a layer to forces on the nodes of a grid over it; z of its frame points out of the layer, and (0, 0) is
 /// the middle of the grid. A force on a node acts as a pressure that falls linearly to the next nodes.
 #[derive(Debug)]
 pub struct ElasticLayer {
-    columns: usize,
-    rows: usize,
+    grid: BilinearGrid,
     /// Displacement by forces on nodes that are `columns − 1` to the right to `columns − 1` to the left, by rows, m/N:
     /// components xx, xy, yy, zz, zx and zy. Those of xz and yz are −zx and −zy.
     response: [Vec<f32>; 6],
@@ -102,40 +103,23 @@ impl ElasticLayer {
             SurfaceStiffness { normal: 1.0 / at.normal, shear: 2.0 / (at.longitudinal + at.transverse) }
         };
         let [untouched, shortest] = [material.thickness, CELL].map(stiffness);
-        Self { columns, rows, response, untouched, shortest }
+        Self { grid: BilinearGrid { columns, rows, spacing: CELL }, response, untouched, shortest }
     }
 
     /// Stiffness per area under a load about as wide as the layer is thick.
     pub fn untouched(&self) -> SurfaceStiffness {
         self.untouched
     }
-
-    /// The four nodes around a point (m) and their shares of it; of a point beyond the grid, those of its edge.
-    fn around(&self, x: f64, y: f64) -> [(usize, f64); 4] {
-        let along = |x: f64, count: usize| {
-            let last = (count - 1) as f64;
-            let at = (x / CELL + 0.5 * last).clamp(0.0, last);
-            let first = at.floor().min(last - 1.0);
-            (first as usize, at - first)
-        };
-        let ((i, u), (j, v)) = (along(x, self.columns), along(y, self.rows));
-        let node = |a: usize, b: usize| (j + b) * self.columns + i + a;
-        [
-            (node(0, 0), (1.0 - u) * (1.0 - v)),
-            (node(1, 0), u * (1.0 - v)),
-            (node(0, 1), (1.0 - u) * v),
-            (node(1, 1), u * v),
-        ]
-    }
 }
 
 /// Forces on a layer in the last step, and how they have moved its surface.
 #[derive(Clone, Debug)]
 pub(crate) struct LayerState {
+    layer: Arc<ElasticLayer>,
     /// Force on each node, N.
     force: Vec<Vec3>,
     /// The forces that the displacements belong to, N.
-    answered: Vec<Vec3>,
+    displaced_by: Vec<Vec3>,
     /// Displacement of each node that the springs at points do not have by themselves, m.
     moved: Vec<Vec3>,
     /// Stiffness per area of the springs at each node.
@@ -146,7 +130,7 @@ pub(crate) struct LayerState {
     row: [Vec<f32>; 5],
 }
 
-/// Change of a force, over the largest one, below which the layer need not be asked again.
+/// Change of a force, over the largest one, up to which displacements are kept.
 const UNCHANGED: f64 = 1e-6;
 /// Pressure that is added everywhere for the stiffness, over the mean one.
 const LEAST_PRESSURE: f64 = 0.2;
@@ -155,15 +139,17 @@ const AROUND: usize = 1;
 
 impl LayerState {
     /// A layer that nothing touches.
-    pub(crate) fn new(layer: &ElasticLayer) -> Self {
-        let none = vec![Vec3::zeros(); layer.columns * layer.rows];
+    pub(crate) fn new(layer: Arc<ElasticLayer>) -> Self {
+        let nodes = layer.grid.nodes();
+        let none = vec![Vec3::zeros(); nodes];
         Self {
             force: none.clone(),
-            answered: none.clone(),
+            displaced_by: none.clone(),
             moved: none,
-            stiffness: vec![layer.untouched; layer.columns * layer.rows],
+            stiffness: vec![layer.untouched; nodes],
             loaded: Vec::new(),
             row: std::array::from_fn(|_| Vec::new()),
+            layer,
         }
     }
 
@@ -173,16 +159,16 @@ impl LayerState {
     }
 
     /// Adds a force (N) on the layer at a point, in its frame.
-    pub(crate) fn add(&mut self, layer: &ElasticLayer, p: &Vec3, force: &Vec3) {
-        for (node, share) in layer.around(p.x, p.y) {
+    pub(crate) fn add(&mut self, p: &Vec3, force: &Vec3) {
+        for (node, share) in self.layer.grid.around(p.x, p.y) {
             self.force[node] += force * share;
         }
     }
 
     /// Stiffness per area of a spring at a point.
-    pub(crate) fn stiffness_at(&self, layer: &ElasticLayer, p: &Vec3) -> SurfaceStiffness {
+    pub(crate) fn stiffness_at(&self, p: &Vec3) -> SurfaceStiffness {
         let mut sum = SurfaceStiffness { normal: 0.0, shear: 0.0 };
-        for (node, share) in layer.around(p.x, p.y) {
+        for (node, share) in self.layer.grid.around(p.x, p.y) {
             sum.normal += share * self.stiffness[node].normal;
             sum.shear += share * self.stiffness[node].shear;
         }
@@ -190,20 +176,23 @@ impl LayerState {
     }
 
     /// Displacement of the surface at a point with a traction on it (Pa), in the frame of the layer, m.
-    pub(crate) fn moved_at(&self, layer: &ElasticLayer, p: &Vec3, traction: &Vec3) -> Vec3 {
-        let smooth: Vec3 = layer.around(p.x, p.y).iter().map(|&(node, share)| self.moved[node] * share).sum();
-        smooth + layer.shortest.compliance(traction, &Vec3::z())
+    pub(crate) fn moved_at(&self, p: &Vec3, traction: &Vec3) -> Vec3 {
+        let smooth: Vec3 =
+            self.layer.grid.around(p.x, p.y).iter().map(|&(node, share)| self.moved[node] * share).sum();
+        smooth + self.layer.shortest.compliance(traction, &Vec3::z())
     }
 
     /// Finds stiffness and displacements for the present forces.
-    pub(crate) fn update(&mut self, layer: &ElasticLayer) {
+    pub(crate) fn update(&mut self) {
         let largest = self.force.iter().map(Vec3::norm_squared).fold(0.0, f64::max);
-        let changes = self.force.iter().zip(&self.answered).map(|(now, then)| (now - then).norm_squared());
+        let changes =
+            self.force.iter().zip(&self.displaced_by).map(|(now, then)| (now - then).norm_squared());
         if changes.fold(0.0, f64::max) <= UNCHANGED * UNCHANGED * largest {
             return;
         }
-        self.answered.clone_from(&self.force);
-        let ElasticLayer { columns, rows, ref response, .. } = *layer;
+        self.displaced_by.clone_from(&self.force);
+        let layer = &*self.layer;
+        let (BilinearGrid { columns, rows, .. }, response) = (layer.grid, &layer.response);
         self.loaded.clear();
         self.loaded.extend((0..self.force.len()).filter(|&node| self.force[node] != Vec3::zeros()));
         self.moved.fill(Vec3::zeros());

@@ -1,14 +1,20 @@
 use super::*;
 
-fn gel() -> ElasticLayer {
+fn gel() -> Arc<ElasticLayer> {
     let material = LayerMaterial { shear_modulus: 1.45e5, poisson: 0.475, thickness: 4e-3 };
-    ElasticLayer::new(&material, 25e-3, 20e-3)
+    Arc::new(ElasticLayer::new(&material, 25e-3, 20e-3))
 }
 
 /// Displacement of the surface at a point by forces on the nodes, m.
-fn moved(layer: &ElasticLayer, state: &LayerState, p: &Vec3) -> Vec3 {
-    let force = layer.around(p.x, p.y).iter().map(|&(node, share)| state.force[node] * share).sum::<Vec3>();
-    state.moved_at(layer, p, &(force / (CELL * CELL)))
+fn moved(state: &LayerState, p: &Vec3) -> Vec3 {
+    let force = state
+        .layer
+        .grid
+        .around(p.x, p.y)
+        .iter()
+        .map(|&(node, share)| state.force[node] * share)
+        .sum::<Vec3>();
+    state.moved_at(p, &(force / (CELL * CELL)))
 }
 
 #[test]
@@ -17,12 +23,12 @@ fn forces_and_displacements_are_reciprocal() {
     let points = [Vec3::new(1e-3, 2.3e-3, 0.0), Vec3::new(-2.2e-3, 0.4e-3, 0.0)];
     let forces = [Vec3::new(0.3, -0.2, -1.0), Vec3::new(-0.4, 0.1, -0.7)];
     let works = [(0, 1), (1, 0)].map(|(loaded, at)| {
-        let mut state = LayerState::new(&layer);
+        let mut state = LayerState::new(layer.clone());
         // Displacements are known around what is loaded.
-        state.add(&layer, &points[loaded], &forces[loaded]);
-        state.add(&layer, &points[at], &(forces[at] * 1e-9));
-        state.update(&layer);
-        moved(&layer, &state, &points[at]).dot(&forces[at])
+        state.add(&points[loaded], &forces[loaded]);
+        state.add(&points[at], &(forces[at] * 1e-9));
+        state.update();
+        moved(&state, &points[at]).dot(&forces[at])
     });
     assert!((works[0] / works[1] - 1.0).abs() < 1e-4, "{works:?}");
 }
@@ -36,14 +42,14 @@ fn springs_come_to_carry_what_the_layer_needs_whatever_they_carried_before() {
     let points: Vec<Vec3> = grid.filter(|p| p.norm() < 3e-3).collect();
     let carried = |start: Vec3| {
         let mut tractions = vec![start; points.len()];
-        let mut state = LayerState::new(&layer);
+        let mut state = LayerState::new(layer.clone());
         for _ in 0..60 {
             state.clear();
-            points.iter().zip(&tractions).for_each(|(p, t)| state.add(&layer, p, &(t * area)));
-            state.update(&layer);
+            points.iter().zip(&tractions).for_each(|(p, t)| state.add(p, &(t * area)));
+            state.update();
             for (p, t) in points.iter().zip(&mut tractions) {
-                let SurfaceStiffness { normal, shear } = state.stiffness_at(&layer, p);
-                let missing = imposed - state.moved_at(&layer, p, t);
+                let SurfaceStiffness { normal, shear } = state.stiffness_at(p);
+                let missing = imposed - state.moved_at(p, t);
                 *t += Vec3::new(shear, shear, normal).component_mul(&missing);
             }
         }

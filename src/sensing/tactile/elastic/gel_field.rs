@@ -9,7 +9,7 @@ use super::{
     pad_wrench::{PadWrench, Taxels},
     substrate::SubstrateCompliance,
 };
-use softvt_geometry::{Mat3, Vec3};
+use softvt_geometry::{BilinearGrid, Mat3, Vec3};
 use softvt_physics::world::PatchPoint;
 use softvt_signal::fourier::Complex32;
 
@@ -265,8 +265,7 @@ impl From<Vec3> for PlanarMotion {
 /// Shear of contact points over the pressure of the field, on a grid of nodes [`Self::SPACING`] apart: the pressure
 /// around a node carries the shear of the points around it.
 struct ShearShares {
-    columns: usize,
-    rows: usize,
+    grid: BilinearGrid,
     /// Of each node, along x and y.
     shares: Vec<Vector2<f64>>,
 }
@@ -278,41 +277,30 @@ impl ShearShares {
     fn new(gel: &Gel, points: &[PatchPoint], pressure: &[f64]) -> Self {
         let count = |length: f64| (length / Self::SPACING).ceil() as usize + 2;
         let (columns, rows) = (count(gel.pad.length), count(gel.pad.width));
-        let mut found = Self { columns, rows, shares: vec![Vector2::zeros(); columns * rows] };
+        let grid = BilinearGrid { columns, rows, spacing: Self::SPACING };
+        let mut shares = vec![Vector2::zeros(); grid.nodes()];
         for point in points {
             let traction = -(point.normal_p * point.pressure + point.shear_p);
-            for (node, share) in found.around(point.p_p.xy()) {
-                found.shares[node] += traction.xy() * (point.area * share);
+            for (node, share) in grid.around(point.p_p.x, point.p_p.y) {
+                shares[node] += traction.xy() * (point.area * share);
             }
         }
-        let mut pressed = vec![0.0; columns * rows];
+        let mut pressed = vec![0.0; grid.nodes()];
         for (c, p) in pressure.iter().enumerate().filter(|(_, p)| **p > 0.0) {
-            for (node, share) in found.around(gel.centre(c)) {
+            let at = gel.centre(c);
+            for (node, share) in grid.around(at.x, at.y) {
                 pressed[node] += p * gel.cell * gel.cell * share;
             }
         }
-        for (share, force) in found.shares.iter_mut().zip(pressed) {
+        for (share, force) in shares.iter_mut().zip(pressed) {
             *share = if force > 0.0 { *share / force } else { Vector2::zeros() };
         }
-        found
+        Self { grid, shares }
     }
 
     /// Shear over pressure at a point, along x and y.
     fn at(&self, p: Vector2<f64>) -> Vector2<f64> {
-        self.around(p).iter().map(|&(node, share)| self.shares[node] * share).sum()
-    }
-
-    /// The four nodes around a point, and its share of each.
-    fn around(&self, p: Vector2<f64>) -> [(usize, f64); 4] {
-        let along = |x: f64, count: usize| {
-            let last = (count - 1) as f64;
-            let at = (x / Self::SPACING + 0.5 * last).clamp(0.0, last - 1e-9);
-            (at as usize, at.fract())
-        };
-        let ((i, u), (j, v)) = (along(p.x, self.columns), along(p.y, self.rows));
-        let node = |a: usize, b: usize| (j + b) * self.columns + i + a;
-        let [left, low] = [1.0 - u, 1.0 - v];
-        [(node(0, 0), left * low), (node(1, 0), u * low), (node(0, 1), left * v), (node(1, 1), u * v)]
+        self.grid.around(p.x, p.y).iter().map(|&(node, share)| self.shares[node] * share).sum()
     }
 }
 

@@ -99,7 +99,7 @@ fn the_tractions_integrate_to_the_solvers_wrench() {
 
 #[test]
 fn the_shear_is_distributed_as_that_of_the_solvers_points() {
-    // Two points press alike; only the right one is sheared, as one that sticks beside one that slips.
+    // All points press alike; those on the right are sheared, as if they stuck and the others slipped.
     let gel = gel(PadSurface::default());
     let skin = graph(8e-3, 2e-4, |_, _| 0.0);
     let point = |x: f64, shear: f64| PatchPoint {
